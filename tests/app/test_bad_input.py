@@ -56,11 +56,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         f"{LAW}lugre -p plant.friction.curve=dahl": "'dahl' is invalid: law dahl has a memory",
         f"{LAW}lugre -p plant.friction.curve=stiction": "'stiction' is invalid: law stiction has",
         f"{LAW}lugre -p plant.friction.curve=linear": "must be at least 1e-12 at every speed",
-        f"{LAW}elasto_plastic -p plant.friction.break_away=1": "at least 0 and below 1",
-        f"{LAW}maxwell_slip -p plant.friction.elements=30": "at least 1 and at most 20",
-        f"{LAW}dahl -p plant.friction.bristle_stiffness=0": "must be a finite number above 0 1/m",
         f"{LAW}dahl -p plant.friction.static=0": "must be at least 1e-12 for law dahl",
-        f"{LAW}dahl -p plant.friction.elements=1.5": "must be a whole number",
     },
     "run": {
         "./nosuch.yaml": "no scenario file ./nosuch.yaml",

@@ -74,23 +74,15 @@ def test_nothing_is_lost_on_a_narrow_terminal(tmp_path: Path) -> None:
 
 
 def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
-    print_parts(
-        TextTable(
-            "drives [bold]",
-            ["", "first", "second"],
-            [["regime", "stick-slip", LONG], ["bag", "-", ""]],
-        )
-    )
+    """One column has no heading; control characters are shown as escapes."""
+    rows = [["regime", "stick-slip", LONG], ["bag", "-", ""]]
+    print_parts(TextTable("drives [bold]", ["", "first", "second"], rows))
     assert capsys.readouterr().out.splitlines() == [
         "drives [bold]",
         "        first       second",
         f"regime  stick-slip  {LONG}",
         "bag     -",
     ]
-
-
-def test_plain_tables(capsys: pytest.CaptureFixture[str]) -> None:
-    """One column has no heading; control characters are shown as escapes."""
     print_parts(measure_table("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}}))
     assert capsys.readouterr().out == "run\namplitude  434 µm\nbag        bags/机床\n"
     print_parts(

@@ -126,12 +126,9 @@ class Refused(WithoutArguments):
         self.force.publish(message)
 
 
-@pytest.mark.parametrize("pace", ["lockstep", pytest.param("realtime", marks=pytest.mark.long)])
-def test_of_forces_that_were_all_refused_none_acted(
-    stickslip: Run, tmp_path: Path, pace: str
-) -> None:
-    overrides = ("plant.reply_timeout=0.1", f"plant.pace={pace}")
-    with ClosedLoop("feed_drive", *overrides, controller=Refused, bag=tmp_path / "bag") as loop:
+def test_of_forces_that_were_all_refused_none_acted(stickslip: Run, tmp_path: Path) -> None:
+    impatient = "plant.reply_timeout=0.1"
+    with ClosedLoop("feed_drive", impatient, controller=Refused, bag=tmp_path / "bag") as loop:
         result = loop.run(0.5)
     assert (result.peak_force, result.peak_applied_force) == (128.6, 0.0)
     assert len(result.dropped_forces.stamp) == len(result.forces.stamp) > 1
@@ -177,20 +174,17 @@ def test_a_current_is_reported_as_a_force(stickslip: Run, tmp_path: Path) -> Non
     time = np.arange(2000) * 1e-3
     table = np.column_stack([time, 1e-3 * np.sin(20.0 * time), 1.5 * np.cos(20.0 * time)])
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,x,i [A]", comments="")
-    given = ("report", "log.csv", "--columns", "time=t,position=x,force=#3")
-    motor = ("--force-constant", "0.35Nm/A", "--pitch", "10mm")
-    newtons = 1.5 * 0.35 * 2.0 * np.pi / 0.01
-    assert stickslip.json(*given, *motor)["peak_force"] == pytest.approx(newtons, rel=1e-9)
-    turns = stickslip.json(*given, *motor[:2], "--rotary")
-    assert turns["peak_force"] == pytest.approx(1.5 * 0.35, rel=1e-9)
-    for arguments, refusal in (
-        (given, "is in A, which is no unit of force"),
-        ((*given, *motor[:2]), "whose pitch is needed"),
-        ((*given[:2], *motor), "--force-constant 0.35Nm/A: is for the current in a table"),
+    columns = ("--columns", "time=t,position=x,force=#3")
+    constant = ("--force-constant", "0.35Nm/A")
+    for options, force in (
+        (("--pitch", "10mm"), 1.5 * 0.35 * 2.0 * np.pi / 0.01),
+        (("--rotary",), 1.5 * 0.35),
     ):
-        done = stickslip(*arguments)
-        assert done.returncode == 2
-        assert refusal in done.stderr
+        report = stickslip.json("report", "log.csv", *columns, *constant, *options)
+        assert report["peak_force"] == pytest.approx(force, rel=1e-9)
+    refused = stickslip("report", "log.csv", *constant)
+    assert refused.returncode == 2
+    assert "--force-constant 0.35Nm/A: is for the current in a table" in refused.stderr
 
 
 def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:

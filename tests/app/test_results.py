@@ -36,18 +36,12 @@ def free() -> ss.Scenario:
 KNOWN = {"plant.mass": 100.0, "plant.damping": 200.0}
 LAWS = ["washout", "velocity_feedback"]
 DISTURBED: dict[str, Any] = {"disturbances": "step", "seeds": 2, "spread": 0.1}
-NOISY = "plant.sensor.position_noise=1e-6"
 
 CASES: dict[str, tuple[tuple[str, ...], Callable[[], Result], str]] = {
     "simulate": (
         ("feed_drive", "--duration", "1"),
         lambda: ss.simulate("feed_drive", duration=1.0),
         "434.1 µm",
-    ),
-    "simulate, with a sensor": (
-        ("feed_drive", "-p", NOISY, "--duration", "1"),
-        lambda: ss.simulate(ss.scenario("feed_drive", NOISY), duration=1.0),
-        "stick-slip",
     ),
     "sweep": (
         (*FREE, "--over", "plant.belt_speed=0.3:0.5:3", "--carry", "both"),
@@ -93,9 +87,7 @@ def draws_nothing(*_: Any, **__: Any) -> Any:
     raise RunError("it takes too long")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.long) if n.endswith("sensor") else n for n in CASES]
-)
+@pytest.mark.parametrize("name", CASES)
 def test_a_command_prints_and_a_page_shows_what_python_returns(
     name: str, stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,31 +61,23 @@ def test_before_the_first_sample_there_are_only_cycles() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "labels", "scales"),
+    ("scenario", "units", "scales"),
     [
-        (
-            "feed_drive",
-            ["displacement (µm)", "velocity (mm/s)", "control force (N)"],
-            (1e6, 1e3, 1.0),
-        ),
-        (
-            "paper",
-            [f"{name} (dimensionless)" for name in ("displacement", "velocity", "control force")],
-            (1.0, 1.0, 1.0),
-        ),
+        ("feed_drive", ["µm", "mm/s", "N", "s"], (1e6, 1e3, 1.0)),
+        ("paper", ["dimensionless"] * 4, (1.0, 1.0, 1.0)),
     ],
 )
 def test_values_are_in_the_units_of_their_axes(
-    scenario: str, labels: list[str], scales: tuple[float, float, float]
+    scenario: str, units: list[str], scales: tuple[float, float, float]
 ) -> None:
     plant = load_scenario(scenario).plant
     body, lines = decoded(fed(plant.flat(), 5.0, 1000.0).frame(50))
     motion, drive = body["motion"], plant.as_drive()
     length, speed, force = scales
-    assert motion["labels"] == labels
-    time_unit = "s" if scenario == "feed_drive" else "dimensionless"
-    assert motion["time_label"] == f"time before now ({time_unit})"
-    assert body["cycles"]["label"] == labels[0].replace("displacement", "amplitude")
+    names = "displacement", "velocity", "control force", "time before now"
+    labels = [f"{name} ({unit})" for name, unit in zip(names, units, strict=True)]
+    assert [*motion["labels"], motion["time_label"]] == labels
+    assert body["cycles"]["label"] == f"amplitude ({units[0]})"
     assert body["cycles"]["amplitude"] == [pytest.approx(4e-4 * length)]
     assert motion["window"] == pytest.approx(50.0 * drive.natural_period)
     assert motion["equilibrium"] == pytest.approx(drive.equilibrium_position * length)
