@@ -6,10 +6,17 @@ from email.parser import Parser
 from importlib import metadata
 from pathlib import Path
 
+import ament_index_python
 import pytest
 from packaging.requirements import Requirement
 
+from tests.docs.shell import OURS, copy_checkout
+
 pytestmark = pytest.mark.long
+
+NAME = "stickslip_ros"
+SCRIPTS = metadata.distribution(NAME).entry_points.select(group="console_scripts")
+EXECUTABLES = {script.name for script in SCRIPTS}
 
 IMPORT_ALL = """
 import importlib, pkgutil, stickslip_ros
@@ -19,6 +26,14 @@ for module in pkgutil.walk_packages(stickslip_ros.__path__, "stickslip_ros."):
     if not module.name.startswith(LEFT_OUT):
         importlib.import_module(module.name)
 """
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
+    """A copy of what git has or would take, so that no build touches the original."""
+    copy = tmp_path_factory.mktemp("workspace") / NAME
+    copy_checkout(copy)
+    return copy
 
 
 @pytest.fixture(scope="module")
@@ -49,21 +64,20 @@ def stem(wheel):
 
 
 def test_holds_every_file_of_the_package(content, checkout):
-    files = [file for file in (checkout / checkout.name).rglob("*") if file.is_file()]
+    files = [file for file in (checkout / NAME).rglob("*") if file.is_file()]
     expected = {
         str(file.relative_to(checkout)) for file in files if file.parent.name != "__pycache__"
     }
-    assert f"{checkout.name}/py.typed" in expected
-    assert {name for name in content.namelist() if name.startswith(f"{checkout.name}/")} == expected
+    assert f"{NAME}/py.typed" in expected
+    assert {name for name in content.namelist() if name.startswith(f"{NAME}/")} == expected
 
 
-def test_holds_what_ros_looks_for(content, stem, checkout, executables):
-    name = checkout.name
+def test_holds_what_ros_looks_for(content, stem, checkout):
     data = f"{stem}.data/data"
-    configuration = {f"share/{name}/config/{file.name}" for file in checkout.glob("config/*")}
-    stubs = {f"lib/{name}/{executable}" for executable in executables}
-    index = {f"share/ament_index/resource_index/packages/{name}", f"share/{name}/package.xml"}
-    index |= {f"share/{name}/hook/path.dsv"}
+    configuration = {f"share/{NAME}/config/{file.name}" for file in checkout.glob("config/*")}
+    stubs = {f"lib/{NAME}/{executable}" for executable in EXECUTABLES}
+    index = {f"share/ament_index/resource_index/packages/{NAME}", f"share/{NAME}/package.xml"}
+    index |= {f"share/{NAME}/hook/path.dsv"}
     files = [entry for entry in content.namelist() if entry.startswith(data)]
     assert {file.removeprefix(f"{data}/") for file in files} == configuration | stubs | index
     for stub in stubs:
@@ -106,10 +120,26 @@ def link(distribution, prefix):
             there.symlink_to(sys.prefix / path)
 
 
-def test_runs_in_a_new_environment(
-    wheel, header, tmp_path, environment, executables, find_executables, check_executable
-):
+def check_executable(executable, environment, folder):
+    """Start it so that it ends by itself: a node by a typo, the script by --help."""
+    node = executable.name.endswith("_node")
+    arguments = ["--ros-args", "-p", "no_such_parameter:=1"] if node else ["--help"]
+    ended = subprocess.run(
+        [executable, *arguments], env=environment, cwd=folder, capture_output=True, text=True
+    )
+    if node:
+        assert ended.returncode == 2, ended.stderr
+        (line,) = ended.stderr.splitlines()
+        assert "no_such_parameter" in line
+    else:
+        assert ended.returncode == 0, ended.stderr
+        assert ended.stdout.startswith(f"usage: {executable.name}")
+
+
+def test_runs_in_a_new_environment(wheel, header, tmp_path, monkeypatch):
     """With nothing but what it asks for: no tool of ours stands in for a missing dependency."""
+    environment = {name: value for name, value in os.environ.items() if name not in OURS}
+    environment["PIP_COMPILE"] = "0"
     prefix = tmp_path / "prefix"
     bare = [sys.executable, "-m", "venv", "--without-pip", prefix]
     subprocess.run(bare, env=environment, check=True)
@@ -126,9 +156,12 @@ def test_runs_in_a_new_environment(
     subprocess.run([*pip, "install", "--quiet", "--no-deps", wheel], env=environment, check=True)
     import_with("ros", left_out=["stickslip_ros.app.dashboard."])
 
-    found = find_executables(prefix)
-    assert found.keys() == executables
-    for executable in found.values():
-        check_executable(executable, environment | {"AMENT_PREFIX_PATH": str(prefix)})
+    # As `ros2 run` does: the ament index gives the prefix, lib/<package> the files.
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    folder = Path(ament_index_python.get_packages_with_prefixes()[NAME], "lib", NAME)
+    found = [file for file in folder.iterdir() if os.access(file, os.X_OK)]
+    assert {file.name for file in found} == EXECUTABLES
+    for executable in found:
+        check_executable(executable, environment | {"AMENT_PREFIX_PATH": str(prefix)}, tmp_path)
 
     import_with("ros", "dashboard")
