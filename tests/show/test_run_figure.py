@@ -93,26 +93,22 @@ def all_acted(force: FloatArray) -> npt.NDArray[np.bool_]:
     return np.ones(len(force), dtype=bool)
 
 
-def moving(drive: Drive, duration: float) -> Drawn:
-    """Draw a motion from rest, sampled at 64 points in a natural period."""
+@pytest.fixture(scope="module")
+def limit_cycle() -> Drawn:
+    """A motion from rest, sampled at 64 points in a natural period, for 100 s."""
     history, meter, cycles = RunHistory(), CycleMeter(20), list[Cycle]()
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    step = drive.natural_period / 64.0
-    for _ in range(round(duration / step)):
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    step = PAPER.natural_period / 64.0
+    for _ in range(round(100.0 / step)):
         motion.advance(step)
         breakpoints = motion.take_breakpoints()
-        done = meter.feed(breakpoints, drive.belt_speed)
-        belt = np.full(len(breakpoints), drive.belt_speed)
+        done = meter.feed(breakpoints, PAPER.belt_speed)
+        belt = np.full(len(breakpoints), PAPER.belt_speed)
         history.take_motion(MeasuredMotion(breakpoints, belt, done, meter.ends))
         history.take_friction(breakpoints.time, breakpoints.position)
         cycles += done
     measures = meter.measures()
-    return Drawn(history, measures, drive, figure_of(history, measures, drive), cycles)
-
-
-@pytest.fixture(scope="module")
-def limit_cycle() -> Drawn:
-    return moving(PAPER, 100.0)
+    return Drawn(history, measures, PAPER, figure_of(history, measures, PAPER), cycles)
 
 
 @pytest.fixture(scope="module")

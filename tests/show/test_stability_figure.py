@@ -7,7 +7,6 @@ from math import inf
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from stickslip_ros.model.control import Washout
 from stickslip_ros.model.friction import Exponential
@@ -164,20 +163,6 @@ def subcritical() -> BifurcationBranches:
     return BifurcationBranches.around(drive, points=8)
 
 
-def check_regions(figure: Figure, names: list[str]) -> None:
-    """Check that the names of the regions stand beside each other, above the curves."""
-    (axes,) = figure.axes
-    assert [text.get_text() for text in axes.texts] == names
-    top = max(np.nanmax(np.asarray(line.get_ydata(), dtype=float)) for line in axes.lines[:8])
-    highest = axes.transData.transform((0.0, top))[1]
-    boxes = [text.get_window_extent() for text in axes.texts]
-    for box in boxes:
-        assert box.y0 > highest
-        assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
-    for one, other in pairwise(boxes):
-        assert one.x1 < other.x0
-
-
 @in_styles
 def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str) -> None:
     figure = branches_figure(supercritical, title="Bifurcation diagram", style=STYLES[style])
@@ -191,7 +176,16 @@ def test_a_supercritical_diagram(supercritical: BifurcationBranches, style: str)
     (axes,) = figure.axes
     assert axes.get_xlabel() == "belt speed $v$ (mm/s)"
     assert axes.get_ylabel() == "displacement $x$ (µm)"
-    check_regions(figure, ["stick-slip", "pure slip", "steady sliding"])
+    # The names of the regions stand beside each other, above the curves.
+    assert [text.get_text() for text in axes.texts] == ["stick-slip", "pure slip", "steady sliding"]
+    top = max(np.nanmax(np.asarray(line.get_ydata(), dtype=float)) for line in axes.lines[:8])
+    highest = axes.transData.transform((0.0, top))[1]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    for box in boxes:
+        assert box.y0 > highest
+        assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
+    for one, other in pairwise(boxes):
+        assert one.x1 < other.x0
     # A cycle has two lines, which meet at the Hopf point.
     (branch,) = supercritical.cycles
     for edge in (branch.least, branch.greatest):
