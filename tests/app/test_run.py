@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 
@@ -12,11 +11,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from tests.app.conftest import Run, Start, ended
-from tests.nodes.graph import PATIENCE, Graph, wait_for
+from tests.nodes.graph import PATIENCE, Graph, states_of, wait_for
+from tests.nodes.processes import wait_for_samples
 from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 
 
@@ -62,8 +61,7 @@ def test_a_plant_that_is_deactivated_pauses_the_run(start_stickslip: Start, grap
 
 def states_of_plant(health: list[DiagnosticArray]) -> list[str]:
     """Return in which states of its life cycle the plant has said to be, the newest last."""
-    told = [s for array in health for s in array.status if s.name == "/feed_drive/plant"]
-    return [entry.value for status in told for entry in status.values if entry.key == STATE]
+    return states_of([s for array in health for s in array.status if s.name == "/feed_drive/plant"])
 
 
 def test_no_node_outlives_a_run_that_is_killed(
@@ -104,12 +102,6 @@ def children(pid: int) -> list[int]:
         for task in Path(f"/proc/{pid}/task").iterdir()
         for child in (task / "children").read_text().split()
     ]
-
-
-def wait_for_samples(process: subprocess.Popen[str], bag: Path) -> None:
-    """Wait until a running recorder has flushed some samples."""
-    wait_for(lambda: sum(file.stat().st_size for file in bag.glob("*.mcap")) > 20_000, "samples")
-    assert process.poll() is None
 
 
 def test_parameters_of_running_nodes_are_set_or_refused(

@@ -10,10 +10,10 @@ import pytest
 
 from stickslip_ros.record.reader import Recording
 from tests.app.conftest import Run, Start, ended
-from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
+from tests.app.test_run import children, command, is_complete, is_running
 from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here
 from tests.nodes.graph import wait_for
-from tests.nodes.processes import Processes
+from tests.nodes.processes import Processes, wait_for_samples
 from tests.testing import controllers
 
 pytestmark = pytest.mark.process

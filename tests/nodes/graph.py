@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
-from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.base.managed import STATE, ManagedNode
 from stickslip_ros.nodes.base.spinner import Spinner
 from stickslip_ros.record.codec import pack_wrench, unpack_header
 from stickslip_ros.record.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
@@ -36,6 +36,11 @@ def wait_for(condition: Callable[[], object], what: str, patience: float = PATIE
     while not condition():
         assert time.monotonic() < deadline, f"waited {patience} s in vain: {what}"
         nothing.wait(0.02)
+
+
+def states_of(health: list[DiagnosticStatus]) -> list[str]:
+    """Return in which states of its life cycle a node has said to be, the newest last."""
+    return [entry.value for status in health for entry in status.values if entry.key == STATE]
 
 
 class Graph:

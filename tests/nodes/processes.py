@@ -5,7 +5,10 @@ import subprocess
 import sys
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+from tests.nodes.graph import wait_for
 
 _LISTENER = """
 import sys
@@ -58,6 +61,16 @@ class Processes:
         process = subprocess.Popen([sys.executable, *arguments], **given)
         self._started.append(process)
         return process
+
+
+def wait_for_samples(process: subprocess.Popen[Any], bag: Path) -> None:
+    """Wait until the recorder of a process that runs has flushed some samples."""
+
+    def recording() -> bool:
+        assert process.poll() is None
+        return sum(file.stat().st_size for file in bag.glob("*.mcap")) > 20_000
+
+    wait_for(recording, "samples")
 
 
 @contextmanager

@@ -10,14 +10,14 @@ from stickslip_ros.motion.motion import Motion
 from stickslip_ros.motion.sampled_loop import SampledLoop
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.managed import FORECAST, STATE
+from stickslip_ros.nodes.base.managed import FORECAST
 from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.timing import Forecast, TimingMonitor, forecast
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
-from tests.nodes.graph import PATIENCE, Graph
+from tests.nodes.graph import PATIENCE, Graph, states_of
 
 MILLISECOND = 1e-3
 
@@ -120,10 +120,6 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns_and_so_does_t
     assert report["in_time"] is False
     share = 100.0 * counts["late_forces"] / counts["samples"]
     assert report["notes"][0].startswith(f"the regime is doubtful: {share:.2g} % of the forces")
-
-
-def states_of(health: list[DiagnosticStatus]) -> list[str]:
-    return [entry.value for status in health for entry in status.values if entry.key == STATE]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.parameter import Parameter
 
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.record.reader import Recording
@@ -24,12 +23,6 @@ ROUND = {
 }
 ENDS = {JOINT_STATES: (1, 2), CONTROL_FORCE: (1, 2), DISTURBANCE_FORCE: (0, 1), RECORDED: (1, 1)}
 """Publishers and subscriptions of each topic while plant, controller and analyzer are active."""
-
-NODES: dict[str, type[ManagedNode]] = {
-    "analyzer": AnalyzerNode,
-    "washout_controller": WashoutControllerNode,
-    "plant": PlantNode,
-}
 
 
 def state_of(graph: Graph, node: str) -> str:
@@ -54,27 +47,20 @@ def ends(graph: Graph) -> dict[object, tuple[int, int]]:
     }
 
 
-@pytest.mark.parametrize("rounds", [2, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
 def test_repeated_life_cycles_leave_one_of_each_and_time_continues(
-    request: pytest.FixtureRequest, graph: Graph, tmp_path: Path, pace: str, rounds: int
+    graph: Graph, tmp_path: Path, pace: str
 ) -> None:
-    """Two in this process, or five of nodes in processes of their own."""
-
-    def bring(name: str, **parameters: object) -> None:
-        if rounds == 2:
-            graph.add(NODES[name], **parameters)
-        else:
-            request.getfixturevalue("processes").node(name, **parameters)
-
-    bring("analyzer", bag=str(tmp_path / "bag"))
-    bring("washout_controller", wait_for=["analyzer"])
-    bring("plant", pace=pace, wait_for=["analyzer", "washout_controller"], reply_timeout=0.2)
+    graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    readers = ["analyzer", "washout_controller"]
+    graph.add(PlantNode, pace=pace, wait_for=readers, reply_timeout=0.2)
     graph.wait_until(lambda: ends(graph) == ENDS, "the loop is closed")
-    for node in NODES:  # they start by themselves: a round before that is over would meet it
+    # They start by themselves: a round before that is over would meet it.
+    for node in (*readers, "plant"):
         while state_of(graph, node) != "active":
             graph.run_for(0.05)
-    for _ in range(rounds):
+    for _ in range(2):
         for node in ("washout_controller", "plant"):
             go_round(graph, node)
             graph.wait_until(lambda: ends(graph) == ENDS, f"one of each again: {ends(graph)}")
@@ -84,7 +70,7 @@ def test_repeated_life_cycles_leave_one_of_each_and_time_continues(
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete
         states, forces = recording.joint_states.stamp, recording.control_forces.stamp
-    assert len(forces) > rounds
+    assert len(forces) > 2
     assert (np.diff(states) > 0).all()
     assert (np.diff(forces) > 0).all()
 
@@ -114,7 +100,8 @@ def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
 def test_who_is_waited_for_listens_only_while_it_is_active(graph: Graph) -> None:
     """A plant must not take it for ready before it is."""
     names = ["washout_controller", "analyzer"]
-    listeners = [graph.add(NODES[name], autostart=False) for name in names]
+    nodes = WashoutControllerNode, AnalyzerNode
+    listeners = [graph.add(node, autostart=False) for node in nodes]
     for node in listeners:
         node.trigger_configure()
     plant = graph.add(PlantNode, wait_for=names, duration=1.0)
