@@ -13,8 +13,8 @@ import pytest
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.testing import own_domain
 from tests.app.conftest import Run, Start
-from tests.app.test_run import wait_for_samples
 from tests.nodes.graph import PATIENCE
+from tests.nodes.processes import wait_for_samples
 from tests.nodes.runs import messages_of
 
 LOCKSTEP = ("--pace", "lockstep", "--duration", "5", "-p", f"plant.reply_timeout={PATIENCE}")
@@ -56,7 +56,7 @@ def test_four_drives_at_once_do_not_hear_each_other(
         _, errors = process.communicate(timeout=3 * PATIENCE)
         assert process.returncode == 0, errors
     for name in DRIVES:
-        done = stickslip(*arguments(name, f"{name}_alone", f"/drive_{name}"))
+        done = stickslip(*arguments(name, f"{name}_alone", f"/drive_{name}"), "--composed")
         assert done.returncode == 0, done.stderr
         bag, alone = tmp_path / name, tmp_path / f"{name}_alone"
         if name == "d":

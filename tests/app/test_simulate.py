@@ -72,10 +72,8 @@ def test_the_file_has_the_trajectory_to_the_last_digit(
 def test_where_nothing_is_measured_it_says_why(stickslip: Run) -> None:
     for arguments, why in (
         ("-p plant.belt_speed=40 --yes --duration 1", "in 1 s: the slide has neither turned back"),
-        ("-p plant.belt_speed=40 --yes --duration 1", "is 818.4 times the critical speed of"),
         ("-p plant.belt_speed=100 --yes --duration 0.1", "is 2046 times the critical speed of"),
         ("--duration 0.05", "in 0.05 s: the natural period is 62.83 ms"),
-        ("-p plant.belt_speed=0.005 --duration 0.19", "0.19 s: "),
         ("-p plant.belt_speed=0.005 --duration 0.19", "run it for longer"),
     ):
         done = stickslip("simulate", "feed_drive", "--no-control", *arguments.split())

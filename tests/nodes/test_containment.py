@@ -20,7 +20,8 @@ from typing import Any
 import pytest
 
 from stickslip_ros.nodes.base.network import this_machine_only
-from tests.nodes.graph import PATIENCE, wait_for
+from tests.nodes.graph import PATIENCE
+from tests.nodes.processes import wait_for_samples
 
 HOST, STRANGER = "192.0.2.1", "192.0.2.2"
 LOOPBACK, GROUP = "127.0.0.1", "239.255.0.1"
@@ -240,19 +241,22 @@ def look(
     return [start("-c", LOOKER, str(2.0 * PATIENCE), *expected, **e) for e in environments]
 
 
-def check_contained(
-    run: subprocess.Popen[str],
-    ours: set[str],
-    start: Start,
-    namespaces: Namespaces,
-    directory: Path,
-    domain: str,
+@pytest.mark.long
+@pytest.mark.parametrize("command", [RUN, ["-c", LOOP]])
+def test_a_run_is_seen_by_local_tools_and_by_no_stranger(
+    start: Start, namespaces: Namespaces, tmp_path: Path, domain: int, command: list[str]
 ) -> None:
+    run = start(namespaces.host, *command)
+    if command[0] == "-c":
+        its_domain, ours = run.stdout.readline().strip(), OURS - {"/feed_drive/bringup"}
+    else:
+        wait_for_samples(run, tmp_path / "bag")
+        its_domain, ours = str(domain), OURS
     table = Path(f"/proc/{run.pid}/net/udp").read_text(encoding="utf-8").splitlines()[1:]
     assert addresses_in("\n".join(line.split()[1] for line in table)) == {LOOPBACK, GROUP}
-    strangers = Strangers(start, namespaces, directory, domain, {"/witness"})
+    strangers = Strangers(start, namespaces, tmp_path, its_domain, {"/witness"})
     assert strangers.answers() == "[]"
-    local = partial(start, namespaces.host, ROS_DOMAIN_ID=domain)
+    local = partial(start, namespaces.host, ROS_DOMAIN_ID=its_domain)
     local("-c", WITNESS)
     tools = look(local, ours | {"/witness"}, {}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"})
     for seen, states, readers in map(result, tools):
@@ -266,34 +270,12 @@ def check_contained(
         assert readers == 0
 
 
-def wait_for_bag(directory: Path, run: subprocess.Popen[str]) -> None:
-    def recording() -> bool:
-        assert run.poll() is None
-        return any(file.stat().st_size > 20_000 for file in directory.glob("bag/*.mcap"))
-
-    wait_for(recording, "the run records")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("command", [RUN, ["-c", LOOP]])
-def test_a_run_is_seen_by_local_tools_and_by_no_stranger(
-    start: Start, namespaces: Namespaces, tmp_path: Path, domain: int, command: list[str]
-) -> None:
-    run = start(namespaces.host, *command)
-    if command[0] == "-c":
-        its_domain, ours = run.stdout.readline().strip(), OURS - {"/feed_drive/bringup"}
-    else:
-        wait_for_bag(tmp_path, run)
-        its_domain, ours = str(domain), OURS
-    check_contained(run, ours, start, namespaces, tmp_path, its_domain)
-
-
 @pytest.mark.long
 def test_a_run_that_is_open_to_the_network_is_seen_by_strangers(
     start: Start, namespaces: Namespaces, tmp_path: Path, domain: int
 ) -> None:
-    run = start(namespaces.host, *RUN, "--network")
-    wait_for_bag(tmp_path, run)
+    run = start(namespaces.host, *RUN, "--network", "--composed")
+    wait_for_samples(run, tmp_path / "bag")
     strangers = Strangers(start, namespaces, tmp_path, str(domain), OURS)
     assert STRANGER in strangers.answers()
     for seen, states, readers in strangers.results():
