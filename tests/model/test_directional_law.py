@@ -19,6 +19,7 @@ from stickslip_ros.model.friction import (
     Exponential,
     FrictionLaw,
     Linear,
+    MaxwellSlip,
     Stribeck,
     Table,
 )
@@ -26,7 +27,6 @@ from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion import Motion
 from stickslip_ros.theory.linear import expand
 from tests.drives import PAPER
-from tests.parts import Iwan
 
 PAIRS: list[tuple[FrictionLaw, FrictionLaw]] = [
     (Stribeck(0.4, 0.25, 0.5), Stribeck(0.5, 0.2, 0.4)),
@@ -119,7 +119,7 @@ def test_a_belt_that_moves_forward_has_the_law_of_backward_slip() -> None:
 
 MEMORIES: Sequence[tuple[FrictionLaw, Any]] = [
     (Dahl(0.4, 20.0), Dahl(0.3, 20.0)),
-    (Iwan(0.4, 5.0), Iwan(0.3, 5.0)),
+    (MaxwellSlip(Coulomb(0.4), 5.0), MaxwellSlip(Coulomb(0.3), 5.0)),
 ]
 
 

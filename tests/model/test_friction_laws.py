@@ -25,7 +25,6 @@ from stickslip_ros.model.friction import (
     Table,
 )
 from stickslip_ros.model.symbols import numbers, structure, with_symbols
-from tests import parts
 from tests.examples import examples
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
@@ -255,5 +254,5 @@ def memory_scale(law: FrictionLaw, relative_speed: float) -> Any:
 
 
 def test_the_memory_of_a_law_that_does_not_say_it_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="iwan does not say what its memory is"):
-        parts.Iwan().memory_after(0.1, (0.0,), (), 1.0)
+    with pytest.raises(InvalidInputError, match="dahl does not say what its memory is"):
+        FrictionLaw.memory_after(Dahl(), 0.1, (0.0,), (), 1.0)

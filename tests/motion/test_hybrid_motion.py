@@ -26,6 +26,7 @@ from stickslip_ros.model.friction import (
     Exponential,
     FrictionLaw,
     Linear,
+    MaxwellSlip,
     Stribeck,
     Table,
 )
@@ -36,7 +37,6 @@ from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
 from stickslip_ros.motion.compiled_flow import parameter_values
 from stickslip_ros.motion.phase import Phase
 from tests.examples import examples
-from tests.parts import Iwan
 
 LAWS: list[FrictionLaw] = [
     Stribeck(0.4, 0.25, 0.5),
@@ -46,7 +46,7 @@ LAWS: list[FrictionLaw] = [
     Directional(Coulomb(0.3), Coulomb(0.6)),
     Table(((0.0, 0.4), (0.5, 0.28))),
     Dahl(0.4, 20.0),
-    Iwan(static=0.4),
+    MaxwellSlip(Coulomb(0.4), 20.0, elements=2, attraction=5.0),
 ]
 SIGNALS: list[tuple[Signal, Signal]] = [
     (NO_SIGNAL, NO_SIGNAL),

@@ -30,7 +30,6 @@ from stickslip_ros.model.signals import table
 from stickslip_ros.motion import Motion
 from stickslip_ros.motion.variational import ShootingMotion, VariationalMotion
 from tests.drives import PAPER
-from tests.parts import Iwan
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
 LAWS: dict[str, FrictionLaw] = {
@@ -149,7 +148,7 @@ STARTED = [
             Directional(Coulomb(0.3), Coulomb(0.6)),
             Table(((0.0, 0.4), (0.5, 0.28))),
             Dahl(0.4, 20.0),
-            Iwan(static=0.4),
+            MaxwellSlip(Coulomb(0.4), 5.0, elements=1, attraction=5.0),
         )
     ),
 ]
