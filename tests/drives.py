@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from stickslip_ros.measures.cycle_measures import Measures
 from stickslip_ros.measures.cycle_meter import CycleMeter
+from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Stribeck
 from stickslip_ros.motion import RecordedMotion
@@ -27,6 +28,11 @@ FEED_DRIVE = Drive(
     friction=Stribeck(static=0.4, minimum=0.25, minimum_speed=0.05),
 )
 """The same drive in other units: 100 rad/s, 1 mm and 0.1 m/s instead of one."""
+
+
+def lag(time_constant: float) -> Actuator:
+    """An actuator that only lags, by a time constant in s."""
+    return Actuator(time_constant=time_constant)
 
 
 class LimitCycle(NamedTuple):

@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 from stickslip_ros.model.friction import Coulomb, Dahl, Stribeck
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.motion import Motion, RecordedMotion
-from tests.drives import FEED_DRIVE, PAPER
-from tests.parts import lag
+from tests.drives import FEED_DRIVE, PAPER, lag
 
 LAG = replace(PAPER, actuator=lag(0.7))
 SLOW = replace(FEED_DRIVE, actuator=lag(0.004))

@@ -20,8 +20,7 @@ from stickslip_ros.motion.sampler import SampleStamps
 from stickslip_ros.motion.simulation import simulate_sampled
 from stickslip_ros.motion.trajectory import TrajectoryRecorder
 from stickslip_ros.samples import Sample
-from tests.drives import FEED_DRIVE, PAPER
-from tests.parts import lag
+from tests.drives import FEED_DRIVE, PAPER, lag
 
 SECOND = 10**9
 

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.model.control import CONTROL_LAWS
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.parameters import ControllerParameters
 from stickslip_ros.show.stability_figure import why_no_figure
 from stickslip_ros.show.study_tables import stability_tables
 from stickslip_ros.studies.stability import Notes, Section, stability
@@ -14,7 +12,6 @@ from stickslip_ros.theory.hopf import hopf_points
 from stickslip_ros.theory.linear import expand
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from tests.drives import FEED_DRIVE
-from tests.parts import Switching
 
 ONLY = "this exists for the washout law only, and the control law is velocity_feedback"
 GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
@@ -24,14 +21,6 @@ GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_g
 def damped() -> Scenario:
     gain = ["velocity_feedback_controller.velocity_gain=-1000"]
     return load_scenario("feed_drive", controller="velocity_feedback").overridden(gain)
-
-
-@pytest.fixture
-def switching(monkeypatch: pytest.MonkeyPatch) -> Scenario:
-    monkeypatch.setitem(CONTROL_LAWS, Switching.name, Switching)
-    return replace(
-        load_scenario("feed_drive"), controller=ControllerParameters(control_law=Switching())
-    )
 
 
 def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
@@ -66,10 +55,13 @@ def test_the_cycle_that_little_feedback_leaves(damped: Scenario) -> None:
     assert "closed_loop.limit_cycles" not in notes
 
 
-def test_a_law_without_equations_says_so(switching: Scenario) -> None:
-    found, notes = stability(switching)
-    assert "the control law switching has no equations" in notes["closed_loop"]
-    assert notes["sampled_loop"] == ("the control law switching is not linear near the equilibrium")
+def test_a_law_without_equations_says_so() -> None:
+    sharp = ["sliding_mode_controller.boundary_layer=0"]
+    found, notes = stability(load_scenario("feed_drive", sharp, controller="sliding_mode"))
+    assert "the control law sliding_mode has no equations" in notes["closed_loop"]
+    assert (
+        notes["sampled_loop"] == "the control law sliding_mode is not linear near the equilibrium"
+    )
     assert set(found["sampled_loop"].values()) == {None}
     assert found["closed_loop"]["eigenvalues"] is None
     assert found["open_loop"]["limit_cycles"]

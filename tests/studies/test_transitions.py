@@ -6,6 +6,7 @@ from math import isnan, sqrt
 import numpy as np
 import pytest
 
+from stickslip_ros.model.control import SlidingMode
 from stickslip_ros.model.friction import Exponential
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
@@ -24,7 +25,6 @@ from stickslip_ros.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.theory.sticking import sticking_onset
 from tests.drives import PAPER
-from tests.parts import Switching
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED
 
 FREE = "plant.expects_control=false"
@@ -177,6 +177,6 @@ def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() 
 
 def test_a_law_that_is_not_linear_has_no_margin() -> None:
     plant = load_scenario("paper").plant
-    drive, law = plant.as_drive(), Switching()
+    drive, law = plant.as_drive(), SlidingMode(boundary_layer=0.0)
     assert isnan(hopf_margin(ControlledDrive(drive, law, plant)))
     assert isnan(hopf_margin(ControlledDrive(drive, law)))

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.actuator import Actuator
-from stickslip_ros.model.control import VelocityFeedback, Washout
+from stickslip_ros.model.control import SlidingMode, VelocityFeedback, Washout
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Exponential, Linear, LuGre
 from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
@@ -28,7 +28,6 @@ from stickslip_ros.theory.linear_sampled_loop import (
 )
 from tests.drives import FEED_DRIVE, PAPER
 from tests.examples import examples
-from tests.parts import Switching
 from tests.theory.closed_forms import CubicLoop
 
 
@@ -155,8 +154,8 @@ def test_the_longest_delay_and_the_highest_rate() -> None:
 
 
 def test_a_law_that_is_not_linear_is_refused_by_name() -> None:
-    with pytest.raises(InvalidInputError, match="the control law switching is not linear"):
-        loop_of(PAPER, 10.0).spectral_radius(Switching())
+    with pytest.raises(InvalidInputError, match="the control law sliding_mode is not linear"):
+        loop_of(PAPER, 10.0).spectral_radius(SlidingMode(boundary_layer=0.0))
 
 
 LUGRE = replace(FEED_DRIVE, friction=LuGre(Exponential(0.4, 0.25, 0.02), 1e5, 100.0))
