@@ -110,9 +110,8 @@ def test_the_committed_study() -> None:
     """Of all cases 92 to 98 % are covered; of one at least 92 %."""
     path = Path(conditions.__file__).with_suffix(".json")
     cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
-    assert {case["case"] for case in cases} == {
-        case for case in conditions.CASES if not case.startswith("late")
-    }
+    known = {case for case in conditions.CASES if not case.startswith("late")}
+    assert {case["case"] for case in cases} == known
     for case in cases:
         assert case["seeds"] >= 20
         assert case["covered"] >= 0.92, case["case"]
@@ -285,9 +284,8 @@ def test_pulses_of_a_checked_record(coulomb: Findings, length: int) -> None:
         assert check["force_error"] < 0.02
         assert check["position_error"] < 1e-4
         assert check["closed_loop_force_error"] < 0.03
-        assert any("does not explain" in note for note in notes_on(coulomb, tapped)) == (
-            length > 40 and tapped.disturbance is None
-        )
+        unexplained = length > 40 and tapped.disturbance is None
+        assert any("does not explain" in each for each in notes_on(coulomb, tapped)) == unexplained
 
 
 def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:

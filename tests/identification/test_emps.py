@@ -66,9 +66,8 @@ def test_a_curve_is_chosen_that_predicts_better(record: Record, table: Findings)
         force = table.curves[number].force
         assert (force[1:] >= force[:-1]).all()
     documented = json.loads(_STUDY.read_text(encoding="utf-8"))["chosen"]
-    assert table.fitted["mass"].value == pytest.approx(
-        documented["parameters"]["plant.mass"]["value"], rel=1e-4
-    )
+    mass = documented["parameters"]["plant.mass"]["value"]
+    assert table.fitted["mass"].value == pytest.approx(mass, rel=1e-4)
     for name in ("force_error", "free_run_error", "position_error", "closed_loop_force_error"):
         assert check[name] == pytest.approx(documented[name], rel=0.01), name
 

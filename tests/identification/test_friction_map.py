@@ -45,9 +45,8 @@ def test_exact_pairs_give_the_constants() -> None:
     assert found == pytest.approx(truth, rel=1e-4)
     (curve,) = fitted_curves(VELOCITY, forces(drop=0.0))
     assert curve.law.name == "coulomb"
-    assert {name: each.value for name, each in curve.estimates.items()} == pytest.approx(
-        {"static": 20.0, "viscous": 60.0}
-    )
+    found = {name: each.value for name, each in curve.estimates.items()}
+    assert found == pytest.approx({"static": 20.0, "viscous": 60.0})
 
 
 def test_directions_that_differ_have_laws_of_their_own() -> None:

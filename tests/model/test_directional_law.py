@@ -58,12 +58,11 @@ def test_a_scaled_law_has_scaled_laws(forward: FrictionLaw, reverse: FrictionLaw
     scaled = law.scaled(4.0, 2.0)
     assert scaled == Directional(forward.scaled(4.0, 2.0), reverse.scaled(4.0, 2.0))
     for speed in (-0.3, 0.3):
-        assert scaled.coefficient(speed / 4.0, np.sign(speed)) == pytest.approx(
-            law.coefficient(speed, np.sign(speed)), rel=1e-14
-        )
-    assert law.characteristic_speed == min(
-        forward.characteristic_speed, reverse.characteristic_speed
-    )
+        coefficient = law.coefficient(speed, np.sign(speed))
+        found = scaled.coefficient(speed / 4.0, np.sign(speed))
+        assert found == pytest.approx(coefficient, rel=1e-14)
+    speeds = forward.characteristic_speed, reverse.characteristic_speed
+    assert law.characteristic_speed == min(speeds)
 
 
 def test_a_refusal_names_the_law_that_is_refused() -> None:

@@ -93,6 +93,5 @@ def test_noise_depends_on_seed_and_number_only(first: int, seed: int) -> None:
 
 def test_noise_stays_the_same_in_all_versions() -> None:
     told, _ = measured(Sensor(position_noise=1.0), np.zeros(3))
-    assert told == pytest.approx(
-        [-0.5199535734446672, -2.743804532142861, 0.985968313441401], rel=1e-12
-    )
+    noise = [-0.5199535734446672, -2.743804532142861, 0.985968313441401]
+    assert told == pytest.approx(noise, rel=1e-12)

@@ -71,9 +71,8 @@ COMPARED: dict[str, Any] = json.loads(
 
 
 def test_thirty_drives_of_each_law_and_each_course_agree() -> None:
-    assert set(COMPARED["by_law_and_kind"]) == {
-        f"{law}, {kind}" for law in random_drives.LAWS for kind in random_drives.KINDS
-    }
+    pairs = {f"{law}, {kind}" for law in random_drives.LAWS for kind in random_drives.KINDS}
+    assert set(COMPARED["by_law_and_kind"]) == pairs
     assert set(COMPARED["by_place"]) == set(random_drives.PLACES)
     for row in [*COMPARED["by_law_and_kind"].values(), *COMPARED["by_place"].values()]:
         assert row["drives"] >= 30

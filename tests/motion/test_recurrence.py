@@ -73,12 +73,8 @@ def test_what_recurs_is_equal_to_the_last_bit(
     one = motion_of(drive, control)
     with integrating_all():
         other = motion_of(drive, control)
-    assert (one.position, one.velocity, one.sticking) == (
-        other.position,
-        other.velocity,
-        other.sticking,
-    )
-    assert (one.memory, one.control_state) == (other.memory, other.control_state)
+    for name in ("position", "velocity", "sticking", "memory", "control_state"):
+        assert getattr(one, name) == getattr(other, name)
     found, known = one.take_breakpoints(), other.take_breakpoints()
     for name in ("time", "position", "velocity", "sticking"):
         np.testing.assert_array_equal(getattr(found, name), getattr(known, name))

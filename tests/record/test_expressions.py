@@ -50,11 +50,8 @@ def test_an_expression_has_the_value_of_its_columns(text: str, first: float, bar
 def test_a_counter_is_unwrapped_over_cells_without_a_number() -> None:
     counter = np.array([65534.0, 65535.0, np.nan, 1.0, 2.0])
     expression = Expression.read("log.csv", "unwrap(n, 65536)*2", {"n": 0})
-    assert np.array_equal(
-        expression.value([counter]),
-        [131068.0, 131070.0, np.nan, 131074.0, 131076.0],
-        equal_nan=True,
-    )
+    expected = [131068.0, 131070.0, np.nan, 131074.0, 131076.0]
+    assert np.array_equal(expression.value([counter]), expected, equal_nan=True)
 
 
 @pytest.mark.parametrize(

@@ -349,11 +349,8 @@ def test_repair_writes_into_its_directory_only(tmp_path: Path) -> None:
     attached = record(Opcode.ATTACHMENT, content + bytes(4))
     bag = bag_of(tmp_path / "bag", SOUND, attached, table)
     repair(bag, tmp_path / "out")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", "out"]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "metadata.yaml",
-        "out_0.mcap",
-    ]
+    assert sorted(os.listdir(tmp_path)) == ["bag", "out"]
+    assert sorted(os.listdir(tmp_path / "out")) == ["metadata.yaml", "out_0.mcap"]
 
 
 def test_names_cannot_steer_a_terminal(tmp_path: Path) -> None:

@@ -65,9 +65,8 @@ def test_messages_metadata_attachments_and_qos_come_as_they_were_written(bag):
         with Recording(path) as recording:
             assert recording.topics == {JOINT_STATES: "sensor_msgs/msg/JointState"}
             assert recording.complete
-            assert list(recording.messages(JOINT_STATES)) == [
-                (JOINT_STATES, number, state) for number, state in enumerate(STATES)
-            ]
+            messages = [(JOINT_STATES, *each) for each in enumerate(STATES)]
+            assert list(recording.messages(JOINT_STATES)) == messages
             assert recording.complete
             assert recording.metadata("scenario") == {"name": "paper"}
             assert recording.attachment("scenario.yaml") == b"plant:"

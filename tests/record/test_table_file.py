@@ -84,10 +84,8 @@ def test_a_velocity_that_is_missing_is_a_difference(tmp_path: Path) -> None:
     path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION))
     recording = read_table(path, {"time": "t", "position": "x"})
     assert recording.samples.velocity[1:-1] == pytest.approx(VELOCITY[1:-1], abs=1e-5)
-    assert [note.partition(" is")[0] for note in recording.notes[1:]] == [
-        "the velocity",
-        "the belt velocity",
-    ]
+    missing = [note.partition(" is")[0] for note in recording.notes[1:]]
+    assert missing == ["the velocity", "the belt velocity"]
     report = report_of_recording(path, {"time": "t", "position": "x"})
     assert report["amplitude"] == pytest.approx(1e-4, rel=1e-3)
     assert report["notes"] == list(recording.notes)
@@ -218,9 +216,8 @@ def test_coarse_data_do_not_tell_whether_it_sticks(tmp_path: Path) -> None:
     report = report_of_recording(path, {"time": "t", "position": "x", **belt})
     assert (report["regime"], report["stick_fraction"]) == (None, None)
     assert report["amplitude"] == pytest.approx(2.5e-3, rel=0.15)
-    assert any(
-        "the regime is not known: the positions do not tell" in each for each in report["notes"]
-    )
+    reason = "the regime is not known: the positions do not tell"
+    assert any(reason in note for note in report["notes"])
 
 
 @pytest.mark.parametrize(

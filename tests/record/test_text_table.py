@@ -115,9 +115,8 @@ def test_a_unit_that_is_not_sure_is_refused_with_a_way(
     text = f"t [s],{name}\n" + rows()
     with pytest.raises(InvalidInputError, match=re.escape(way)):
         read(tmp_path, text, "#1", position)
-    assert read(tmp_path, text, "#1", "#2*0.0254").samples.position == pytest.approx(
-        0.0254 * POSITION
-    )
+    samples = read(tmp_path, text, "#1", "#2*0.0254").samples
+    assert samples.position == pytest.approx(0.0254 * POSITION)
 
 
 def test_a_difference_of_columns_has_their_unit(tmp_path: Path) -> None:
@@ -444,9 +443,8 @@ def test_differences_of_decimals_do_not_jump(tmp_path: Path) -> None:
     commands = [(n, 4e-5 * min(n, 2500)) for n in range(3000)]
     lines = [f"{n * 2e-3:.4f},{cmd:.8f},{cmd - 4e-5:.8f}" for n, cmd in commands]
     found = read(tmp_path, "t,cmd,act\n" + "\n".join(lines), "t", "cmd-act")
-    assert found.notes[1:] == (
-        "the velocity is not recorded: it is the difference of the positions",
-    )
+    (note,) = found.notes[1:]
+    assert note == "the velocity is not recorded: it is the difference of the positions"
 
 
 def test_a_table_that_gives_no_sample_is_refused(tmp_path: Path) -> None:

@@ -83,9 +83,8 @@ def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() ->
     middle = drive.equilibrium_position
     plan = Grid((Axis(POSITION, middle - 0.8, middle + 0.8, 5), Axis(VELOCITY, -0.8, 0.8, 5)))
     basins = basins_of(scenario, plan, continuous=True)
-    assert {a.regime for a in basins.attractors} == {
-        Regime.EQUILIBRIUM, Regime.STICK_SLIP, Regime.UNBOUNDED
-    }  # fmt: skip
+    regimes = {Regime.EQUILIBRIUM, Regime.STICK_SLIP, Regime.UNBOUNDED}
+    assert {attractor.regime for attractor in basins.attractors} == regimes
     assert all(attractor.steady for attractor in basins.attractors)
     # Where the bifurcation is supercritical, and with the same linear gain, there is no cycle.
     soft = scenario.changed({"washout_controller.cubic_gain": -1.0})

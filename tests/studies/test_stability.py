@@ -59,9 +59,7 @@ def test_a_law_without_equations_says_so() -> None:
     sharp = ["sliding_mode_controller.boundary_layer=0"]
     found, notes = stability(load_scenario("feed_drive", sharp, controller="sliding_mode"))
     assert "the control law sliding_mode has no equations" in notes["closed_loop"]
-    assert (
-        notes["sampled_loop"] == "the control law sliding_mode is not linear near the equilibrium"
-    )
+    assert notes["sampled_loop"].startswith("the control law sliding_mode is not linear near")
     assert set(found["sampled_loop"].values()) == {None}
     assert found["closed_loop"]["eigenvalues"] is None
     assert found["open_loop"]["limit_cycles"]

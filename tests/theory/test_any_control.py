@@ -91,9 +91,8 @@ def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: VelocityFeed
 
 
 def test_enough_velocity_feedback_leaves_no_cycle() -> None:
-    assert least_cycle(PAPER, VelocityFeedback(-0.1, 0.0)) == least_cycle(
-        altered(PAPER, VelocityFeedback(-0.1, 0.0))
-    )
+    little = VelocityFeedback(-0.1, 0.0)
+    assert least_cycle(PAPER, little) == least_cycle(altered(PAPER, little))
     assert least_cycle(PAPER, VelocityFeedback(-3.0, 0.0)) is None
 
 

@@ -276,6 +276,5 @@ def test_what_is_not_linear_is_left_out() -> None:
     limited = replace(FEED_DRIVE, actuator=Actuator(limit=10.0, resolution=1.0))
     rough = LinearSampledLoop.from_drive(limited, 1000.0, 0.0, sensor(2, **ROUGH))
     smooth = linear_loop(FEED_DRIVE, 0.0, 2)
-    assert np.array_equal(
-        rough.transition_matrix(CONTROL_LAWS[0]), smooth.transition_matrix(CONTROL_LAWS[0])
-    )
+    matrices = [loop.transition_matrix(CONTROL_LAWS[0]) for loop in (rough, smooth)]
+    assert np.array_equal(*matrices)
