@@ -32,10 +32,8 @@ pytestmark = pytest.mark.long
 def errors(law: ControlLaw, duration: float) -> FloatArray:
     """Return the error of the displacement after a step of 1 m, from `START` on."""
     motion = Motion(DRIVE, 0.0, 0.0)
-    loop, controller = (
-        SampledLoop(motion, RATE, 10**9),
-        Controller(law, step(1.0, 0.0, 1e9).reference),
-    )
+    loop = SampledLoop(motion, RATE, 10**9)
+    controller = Controller(law, step(1.0, 0.0, 1e9).reference)
     found: list[float] = []
     for _ in range(round(duration * RATE)):
         found.append(motion.position - 1.0)

@@ -144,10 +144,8 @@ def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, compla
 
 def test_a_reference_of_another_node_is_read_by_its_names():
     """Positions or velocities may be empty; efforts have no effect."""
-    names, sent = (
-        ["gripper", "slide"],
-        {(1.0, None): ([0.0, 1.0], []), (None, 2.0): ([], [0.0, 2.0])},
-    )
+    names = ["gripper", "slide"]
+    sent = {(1.0, None): ([0.0, 1.0], []), (None, 2.0): ([], [0.0, 2.0])}
     for reference, values in sent.items():
         data = serialize_message(joint_state(7, *values, [9.0], names))
         columns, refused = references_in(*joined([data]))

@@ -112,12 +112,8 @@ def test_of_several_joints_one_must_be_chosen(tmp_path: Path) -> None:
 
 def test_what_the_analyzer_used_holds_beside_other_options(tmp_path: Path) -> None:
     messages = [
-        (
-            STATES,
-            recorded(i),
-            state(recorded(i), ["elbow", "axis"], [0.1, x], [0.0, 1.0], [2.0, 3.0]),
-        )
-        for i, x in enumerate(POSITION.tolist())
+        (STATES, at, state(at, ["elbow", "axis"], [0.1, x], [0.0, 1.0], [2.0, 3.0]))
+        for at, x in zip(LOG, POSITION.tolist(), strict=True)
     ]
     kept = {"joint": '"axis"', "belt_joint": '"elbow"', "force_type": '"effort"'}
     write_bag(tmp_path / "bag", messages, tables={"stickslip_ros/analyzer": kept})
@@ -128,14 +124,8 @@ def test_what_the_analyzer_used_holds_beside_other_options(tmp_path: Path) -> No
 
 
 def test_joints_in_messages_of_their_own_are_several(tmp_path: Path) -> None:
-    write_bag(
-        tmp_path / "bag",
-        [
-            axis(i, x, name=name)
-            for i, x in enumerate(POSITION.tolist())
-            for name in ("left", "right")
-        ],
-    )
+    both = [axis(i, x, name=n) for i, x in enumerate(POSITION.tolist()) for n in ("left", "right")]
+    write_bag(tmp_path / "bag", both)
     with pytest.raises(BagError, match="joints left, right: --joint NAME must choose one"):
         report_of_recording(tmp_path / "bag", belt_speed=BELT)
     report = report_of_recording(tmp_path / "bag", belt_speed=BELT, layout=BagLayout(joint="right"))
@@ -214,13 +204,9 @@ def test_a_belt_may_have_messages_of_its_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("every", "left_out"), [(2, 150), (3, 0)])
 def test_velocities_that_some_messages_lack(tmp_path: Path, every: int, left_out: int) -> None:
     """Half of them: the other messages are left out. Few: the velocity is of the positions."""
-    write_bag(
-        tmp_path / "bag",
-        [
-            axis(i, x, [v] if i % every == 0 else [])
-            for i, (x, v) in enumerate(zip(POSITION.tolist(), VELOCITY.tolist(), strict=True))
-        ],
-    )
+    moves = enumerate(zip(POSITION.tolist(), VELOCITY.tolist(), strict=True))
+    messages = [axis(i, x, [v] if i % every == 0 else []) for i, (x, v) in moves]
+    write_bag(tmp_path / "bag", messages)
     with Recording(tmp_path / "bag", belt_speed=BELT) as recording:
         block = next(recording.blocks())
         notes = "".join(recording.notes)

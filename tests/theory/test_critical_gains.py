@@ -112,10 +112,8 @@ def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
 def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) -> None:
     critical = critical_gains(PAPER, Washout(corner_frequency, 0.0, -1.0))
     gains = Washout(corner_frequency, 0.8 * critical.linear, -1.0)
-    cycle, by_run = (
-        limit_cycle_from_hopf(PAPER, gains),
-        limit_cycle_of_run(PAPER, 0.0, control=gains),
-    )
+    cycle = limit_cycle_from_hopf(PAPER, gains)
+    by_run = limit_cycle_of_run(PAPER, 0.0, control=gains)
     assert cycle.stable
     assert cycle.position == pytest.approx(by_run.position, rel=1e-9)
     assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
