@@ -267,7 +267,7 @@ def test_what_is_refused() -> None:
 
 @pytest.mark.long
 def test_friction_without_a_law() -> None:
-    found = identify([study.record("stribeck", "ramp", 3, 1.5)], "table")  # nor a normal force
+    found = identify([study.record("stribeck", "ramp", 3, 1.0)], "table")  # nor a normal force
     assert {"mass", "stiffness"} <= found.fitted.keys()
     curve = found.curves[0]
     law = study.LAWS["stribeck"]

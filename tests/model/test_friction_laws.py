@@ -142,7 +142,7 @@ def test_the_static_coefficient_is_the_largest(law: FrictionLaw, refusal: str | 
 
 
 @every_law
-@examples(quick=15, thorough=50)
+@examples(quick=15, thorough=30)
 @given(st.data(), speeds, signs)
 def test_friction_starts_at_its_limits_and_is_odd_where_they_are_equal(
     kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float
@@ -160,7 +160,7 @@ def test_friction_starts_at_its_limits_and_is_odd_where_they_are_equal(
 
 
 @every_law
-@examples(quick=15, thorough=50)
+@examples(quick=15, thorough=30)
 @given(st.data(), speeds, signs, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
 def test_in_other_units_it_has_the_same_coefficient_and_characteristic_speed(
     kind: type[FrictionLaw],
@@ -181,7 +181,7 @@ def test_in_other_units_it_has_the_same_coefficient_and_characteristic_speed(
 
 
 @every_law
-@examples(quick=10, thorough=50)
+@examples(quick=10, thorough=30)
 @given(data=st.data())
 def test_arrays_and_symbols_give_what_numbers_give(
     kind: type[FrictionLaw], data: st.DataObject
