@@ -59,8 +59,8 @@ _REFINED_SHARE = 0.5
 """Stick fraction up to which a fit of the mean cycle refines it."""
 _LEAST_SLIP, _APART = 12.0, 4.0
 """Samples in a slip from which it does; errors of a stick fraction within which both agree."""
-_SAME_VELOCITY, _REST_SHARE = 0.05, 0.2
-"""Relative difference of two velocities of a guide that are the same; share of rests on another."""
+_REST_SHARE = 0.2
+"""Share of the time in which a slide rests on another guide than its belt."""
 _UNLIKE = 0.2
 """Standard error of the mean period, in periods, above which cycles have nothing in common."""
 _OTHER_SPEED = 0.1
@@ -165,16 +165,10 @@ def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, floa
 
     Also the share of the time in which it does. None where there is no other one.
     """
-    segmented, samples, lows = rests_and_slips(window, reading), window.samples, window.lows
-    if segmented is not None and segmented.rests:
+    segmented, samples = rests_and_slips(window, reading), window.samples
+    if len(samples) < FEWEST_SAMPLES or (segmented is not None and segmented.rests):
         return None
-    samples = samples[samples.row(lows[0].time) if lows else 0 :]
-    if len(samples) < FEWEST_SAMPLES:
-        return None
-    belt = float(samples.belt[-1])
     velocity = resting_velocity(samples.time, samples.position)
-    if abs(velocity - belt) <= _SAME_VELOCITY * max(abs(velocity), abs(belt)):
-        return None
     on_guide = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
     share = 0.0 if on_guide is None or not on_guide.rests else on_guide.cycle.stick_fraction
     return (velocity, share) if share > _REST_SHARE else None

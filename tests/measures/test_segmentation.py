@@ -76,3 +76,14 @@ def test_a_capture_of_one_and_a_half_periods_has_no_false_regime(start: int) -> 
     feed = TRAVEL / PERIOD
     measures = fed(columns(STAMPS[: len(time)], feed * time - seen, None, feed), UNKNOWN).measures()
     assert measures.regime in (None, Regime.STICK_SLIP)
+
+
+def test_a_slide_on_a_belt_whose_velocity_is_told_wrong_rests_on_another_guide() -> None:
+    time = 1e-9 * STAMPS[:3150]
+    noise = 2e-6 * np.random.default_rng(1).standard_normal(len(time))
+    lag = TRAVEL / PERIOD * time - stairs(time + 0.3) + noise
+    meter = fed(columns(STAMPS[:3150], lag, belt_velocity=0.93 * TRAVEL / PERIOD), UNKNOWN)
+    assert meter.other_guide is not None
+    velocity, share = meter.other_guide
+    assert velocity == pytest.approx(TRAVEL / PERIOD, rel=0.05)
+    assert share == pytest.approx(1.0 - SLIP / PERIOD, abs=0.06)
