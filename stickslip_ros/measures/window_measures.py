@@ -63,6 +63,8 @@ _REST_SHARE = 0.2
 """Share of the time in which a slide rests on another guide than its belt."""
 _UNLIKE = 0.2
 """Standard error of the mean period, in periods, above which cycles have nothing in common."""
+_RIPPLE = 4.0
+"""Range of the middles of cycles beside a line, in amplitudes, above which they are ripples."""
 _OTHER_SPEED = 0.1
 """Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
@@ -229,6 +231,8 @@ def _by_reversals(
     fit = None if quick else _fit(window, reading, part.samples, starts)
     if fit is not None:
         return _found(window, part.samples, fit, fit.noise), fit
+    if _are_ripples(part.cycles):
+        return without_cycles(None, None), None
     # Half of the cycles: a single one may seem to stick for a moment.
     measures = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
     fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
@@ -244,6 +248,15 @@ def _by_reversals(
     periods = [cycle.period for cycle in part.cycles]
     unlike = np.std(periods) > _UNLIKE * np.mean(periods) * len(periods) ** 0.5
     return undecided(measures) if unlike else measures, None
+
+
+def _are_ripples(cycles: Sequence[Cycle]) -> bool:
+    """Return whether cycles are ripples, as of 50 Hz, on a larger motion to and fro."""
+    if len(cycles) < LEAST_CYCLES:
+        return False
+    order, middle = np.arange(len(cycles)), np.array([cycle.midpoint for cycle in cycles])
+    beside = middle - np.polyval(np.polyfit(order, middle, 1), order)
+    return float(np.ptp(beside)) > _RIPPLE * float(np.mean([cycle.amplitude for cycle in cycles]))
 
 
 def _by_line(

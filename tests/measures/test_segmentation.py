@@ -87,3 +87,12 @@ def test_a_slide_on_a_belt_whose_velocity_is_told_wrong_rests_on_another_guide()
     velocity, share = meter.other_guide
     assert velocity == pytest.approx(TRAVEL / PERIOD, rel=0.05)
     assert share == pytest.approx(1.0 - SLIP / PERIOD, abs=0.06)
+
+
+def test_a_vibration_on_a_larger_motion_is_no_cycle() -> None:
+    time = 1e-9 * STAMPS
+    noise = 2e-6 * np.random.default_rng(1).standard_normal(len(time))
+    ripple = 0.1 * TRAVEL * np.sin(2.0 * np.pi * 35.3 * time)
+    lag = TRAVEL / PERIOD * time - stairs(time) + ripple + noise
+    measures = fed(columns(STAMPS, lag, belt_velocity=TRAVEL / PERIOD), UNKNOWN).measures()
+    assert (measures.regime, measures.amplitude, measures.period) == (None, None, None)
