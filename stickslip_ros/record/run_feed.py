@@ -168,6 +168,11 @@ class RunFeed:
                 f"relative to a guide at {speed} the slide rests {share:.0%} of the time, and "
                 "relative to the belt it does not: with this belt velocity the regime is known"
             )
+        if report["regime"] is None and report["period"] is None:
+            return (
+                "the regime is not known: no three cycles repeat up to the end, and the slide does "
+                "not stay at rest"
+            )
         if report["regime"] != Regime.PURE_SLIP:
             return None
         steps = report["amplitude"] / (motion.step or float_info.min)

@@ -1,6 +1,7 @@
 """Rests and slips that are not those of a simulated drive, as machines record them."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.sample_assumptions import UNKNOWN
 from stickslip_ros.measures.segmentation import stick_slip
+from stickslip_ros.record.report import report_of_recording
 from tests.measures.records import columns, fed, milliseconds
 
 PERIOD, TRAVEL, SLIP, STEP = 0.7, 1e-3, 0.2, 2e-6
@@ -96,3 +98,12 @@ def test_a_vibration_on_a_larger_motion_is_no_cycle() -> None:
     lag = TRAVEL / PERIOD * time - stairs(time) + ripple + noise
     measures = fed(columns(STAMPS, lag, belt_velocity=TRAVEL / PERIOD), UNKNOWN).measures()
     assert (measures.regime, measures.amplitude, measures.period) == (None, None, None)
+
+
+def test_a_motion_that_repeats_nothing_has_no_regime_and_a_reason(tmp_path: Path) -> None:
+    time = 0.01 * np.arange(800)
+    velocity = np.array([0.0, 1.0, 0.1, 0.6, 0.0, 0.9, 0.2, 0.5])[np.arange(800) // 100]
+    np.savetxt(tmp_path / "turns.csv", np.c_[time, 1e-4 * np.cumsum(velocity)], delimiter=",")
+    report = report_of_recording(tmp_path / "turns.csv", {"time": "#1", "position": "#2"})
+    assert report["regime"] is None
+    assert any("no three cycles repeat" in note for note in report["notes"])
