@@ -69,6 +69,8 @@ _OTHER_SPEED = 0.1
 """Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
+_MOST_NEAR = 0.4
+"""Share of the samples near an extreme, above which they do not tell whether it rests there."""
 _NEAR_STEPS, _LEAST_DWELL, _DWELL_GROWTH = 4.0, 4.0, 1.25
 """Distance from an extreme, in steps, that is near; number of samples near it that tell a rest;
 growth of their number with four times the distance below which they do: it is two in a parabola."""
@@ -85,8 +87,6 @@ def measure(
     segmented = rests_and_slips(window, reading)
     if segmented is None or segmented.passes:
         measures, fit = _by_reversals(window, reading, quick=quick)
-        if measures.regime is Regime.PURE_SLIP and _rests_where_it_turns(window):
-            measures = undecided(measures)
         return _as_it_passes(window, measures, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
@@ -101,6 +101,7 @@ def measure(
 def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
     """Return measures that do not deny a stick of a slide that passes the speed of the belt.
 
+    Nor that of one which may rest where it turns.
     Nor do they claim one at a speed so far from that of the belt that no calibration errs by it.
     """
     passes = fit is not None and fit.overtakes and measures.regime is Regime.PURE_SLIP
@@ -108,6 +109,7 @@ def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> 
         part = window if len(window.samples) or window.before is None else window.before
         belt = abs(float(part.samples.belt[-1]))
         passes |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
+    passes |= measures.regime is Regime.PURE_SLIP and _may_rest_where_it_turns(window)
     return undecided(measures) if passes else measures
 
 
@@ -138,10 +140,11 @@ def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | N
     return segmented if since <= STALE_PERIODS * segmented.cycle.period else None
 
 
-def _rests_where_it_turns(window: Window) -> bool:
-    """Return whether a slide on a guide at rest stays where it turns for longer than it need.
+def _may_rest_where_it_turns(window: Window) -> bool:
+    """Return whether a slide on a guide at rest may rest where it turns.
 
     The number of samples near an extreme grows with the root of the distance, unless it rests.
+    Where most samples are near one, noise or steps hide a rest.
     """
     samples, near, far = window.samples, 0, 0
     if samples.belt.any():
@@ -154,7 +157,8 @@ def _rests_where_it_turns(window: Window) -> bool:
             near += int(np.count_nonzero(below <= distance))
             far += int(np.count_nonzero(below <= 4.0 * distance))
     dwells = near > _LEAST_DWELL * 2 * (len(ends) - 1) > 0
-    return dwells and far < _DWELL_GROWTH * near
+    hidden = len(ends) > 1 and near > _MOST_NEAR * (ends[-1] - ends[0])
+    return (dwells and far < _DWELL_GROWTH * near) or hidden
 
 
 def segmented_measures(window: Window, segmented: StickSlip) -> Measures:

@@ -107,3 +107,11 @@ def test_a_motion_that_repeats_nothing_has_no_regime_and_a_reason(tmp_path: Path
     report = report_of_recording(tmp_path / "turns.csv", {"time": "#1", "position": "#2"})
     assert report["regime"] is None
     assert any("no three cycles repeat" in note for note in report["notes"])
+
+
+def test_where_noise_hides_a_rest_at_the_turns_there_is_no_regime() -> None:
+    course = np.clip(1.1 * np.sin(2.0 * np.pi * 1e-9 * STAMPS / PERIOD), -1.0, 1.0)
+    noise = 5e-5 * np.random.default_rng(1).standard_normal(len(STAMPS))
+    measures = fed(columns(STAMPS, TRAVEL * course + noise, belt_velocity=0.0), UNKNOWN).measures()
+    assert measures.regime is None
+    assert measures.period == pytest.approx(PERIOD, rel=0.01)
