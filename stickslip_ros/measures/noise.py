@@ -108,7 +108,9 @@ def medians(signal: FloatArray) -> FloatArray:
     Running medians of three take out single impulses and keep edges (J. W. Tukey, Exploratory Data
     Analysis, 1977, chapter 7).
     """
-    middle = np.sort([signal[:-2], signal[1:-1], signal[2:]], axis=0)[1]
+    before, here, after = signal[:-2], signal[1:-1], signal[2:]
+    low, high = np.minimum(before, here), np.maximum(before, here)
+    middle = np.maximum(low, np.minimum(high, after))
     return np.concatenate([signal[:1], middle, signal[1:][-1:]])
 
 
@@ -133,14 +135,16 @@ def impulses(signal: FloatArray, noise: float) -> BoolArray:
     if len(signal) < 5:
         return is_impulse
     bend = signal[1:-1] - (signal[:-2] + signal[2:]) / 2.0
+    size = np.abs(bend)
+    is_large = size[1:-1] > _IMPULSE * noise
+    if not is_large.any():
+        return is_impulse
     here, before, after = bend[1:-1], bend[:-2], bend[2:]
-    size = np.abs(here)
     alternates = (here * before < 0.0) & (here * after < 0.0)
-    alternates &= np.minimum(np.abs(before), np.abs(after)) > 0.25 * size
-    is_impulse[2:-2] = alternates & (size > _IMPULSE * noise)
+    alternates &= np.minimum(size[:-2], size[2:]) > 0.25 * size[1:-1]
     # Next to an impulse the bends alternate, too, and are half as large.
-    larger = np.maximum(np.abs(before), np.abs(after))
-    is_impulse[2:-2] &= size > larger
+    alternates &= size[1:-1] > np.maximum(size[:-2], size[2:])
+    is_impulse[2:-2] = alternates & is_large
     return is_impulse
 
 

@@ -27,6 +27,11 @@ def parabolas(course: FloatArray, reach: int) -> list[FloatArray]:
     return [value + course[0], slope, bend]
 
 
+def slopes(course: FloatArray, reach: int) -> FloatArray:
+    """Return the slopes, in rows, of those parabolas that have `reach` rows on both sides."""
+    return np.convolve(course - course[0], _least_squares(reach)[1][::-1], "valid")
+
+
 def vertex(course: FloatArray) -> tuple[float, float]:
     """Return where, in rows from the middle of an odd number, a parabola is extreme, and its value.
 

@@ -6,7 +6,6 @@ from math import copysign, inf
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from stickslip_ros.arrays import FloatArray, median
 from stickslip_ros.errors import InvalidInputError
@@ -102,9 +101,9 @@ class _Speeds:
         self.belt = max(self.belt, float(belt_speed.max()))
         self.slide = max(self.slide, float(speed.max()))
         if len(velocity) >= count:
-            rows = sliding_window_view(velocity, count)
-            lasting = max(float(rows.min(axis=1).max()), -float(rows.max(axis=1).min()))
-            self.lasting = max(self.lasting, lasting)
+            following = [velocity[row : len(velocity) - count + 1 + row] for row in range(count)]
+            least, most = np.minimum.reduce(following), np.maximum.reduce(following)
+            self.lasting = max(self.lasting, float(least.max()), -float(most.min()))
 
 
 class SampleMeter:

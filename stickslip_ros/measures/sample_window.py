@@ -119,12 +119,11 @@ class WindowMeter:
         """Add the samples that follow (s, m, m/s); return the cycles that they complete."""
         self.ends = []
         completed: list[Cycle] = []
-        new = NoisySamples(time, position, velocity, belt)
-        while len(new) > 0:
-            due = _BATCH - self._run % _BATCH
-            part, new = new[:due], new[due:]
-            self._run += len(part)
-            self._add(part)
+        new, last = np.array([time, position, velocity, belt]), 0
+        while last < len(time):
+            first, last = last, min(last + _BATCH - self._run % _BATCH, len(time))
+            self._run += last - first
+            self._add(new[:, first:last])
             if self._run % _LOOK_INTERVAL == 0 or self._run == _FIRST_LOOK:
                 self._look()
             # Always at the same samples: what is found must not depend on the blocks.
@@ -137,23 +136,23 @@ class WindowMeter:
         """Samples so far; the last two may still be impulses."""
         return NoisySamples(*self._table[:, self._rows])
 
-    def _add(self, part: NoisySamples) -> None:
+    def _add(self, columns: FloatArray) -> None:
         """Add samples, and drop impulses, which the samples beside them tell."""
-        self._replace_last(0, part)
+        self._replace_last(0, columns)
         if self.noise > 0.0:
-            last = self._held[-len(part) - 2 * _UNKNOWN :]
-            is_impulse = impulses(last.position, self.noise)
+            last = self._table[:, self._rows][:, -columns.shape[1] - 2 * _UNKNOWN :]
+            is_impulse = impulses(NoisySamples(*last).position, self.noise)
             if is_impulse.any():
-                self._replace_last(len(last), last[~is_impulse])
+                self._replace_last(len(is_impulse), last[:, ~is_impulse])
 
-    def _replace_last(self, rows: int, samples: NoisySamples) -> None:
+    def _replace_last(self, rows: int, columns: FloatArray) -> None:
         start, stop = self._rows.start, max(self._rows.stop - rows, self._rows.start)
-        end = stop + len(samples)
+        end = stop + columns.shape[1]
         if end > self._table.shape[1]:
             table = np.empty((4, 2 * (end - start) + 1024))
             table[:, : stop - start] = self._table[:, start:stop]
             self._table, start, stop, end = table, 0, stop - start, end - start
-        self._table[:, stop:end] = list(vars(samples).values())
+        self._table[:, stop:end] = columns
         self._rows = slice(start, end)
 
     def _look(self) -> None:

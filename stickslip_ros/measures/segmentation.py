@@ -346,7 +346,8 @@ def _reach(travel: float, noise: float, step: float) -> int:
 
 def _changes(position: FloatArray, reach: int) -> FloatArray:
     """Return the sum of each `reach` positions less that of as many before."""
-    total = np.concatenate([[0.0], np.cumsum(position - position[0])])
+    total = np.zeros(len(position) + 1)
+    np.cumsum(position - position[0], out=total[1:])
     return total[2 * reach :] - 2.0 * total[reach:-reach] + total[: -2 * reach]
 
 
@@ -356,9 +357,11 @@ def _rests(position: FloatArray, reach: int, most: float) -> list[Rest]:
     The means over `reach` positions before and after a row of a rest differ by at most `most`.
     """
     still = np.abs(_changes(position, reach)) <= most * reach
-    turns = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
+    still = np.concatenate([[False], still, [False]])
+    turns = np.flatnonzero(still[1:] != still[:-1]).tolist()
     apart: list[tuple[int, int]] = []
-    for first, last in (turns + np.array([0, 2 * reach - 2])).tolist():
+    for first, end in zip(turns[::2], turns[1::2], strict=True):
+        last = end + 2 * reach - 2
         if apart and apart[-1][1] >= first:
             middle = (apart[-1][1] + first) // 2
             apart[-1] = apart[-1][0], middle
@@ -366,7 +369,7 @@ def _rests(position: FloatArray, reach: int, most: float) -> list[Rest]:
         if last > first:
             apart.append((first, last))
     inner = [slice((3 * a + b) // 4, max((a + 3 * b) // 4, (3 * a + b) // 4 + 1)) for a, b in apart]
-    levels = [float(np.mean(position[rows])) for rows in inner]
+    levels = [float(position[rows].mean()) for rows in inner]
     return [Rest(*rows, level) for rows, level in zip(apart, levels, strict=True)]
 
 
@@ -400,9 +403,10 @@ def _apart(position: FloatArray, rests: list[Rest], least: float) -> list[Rest]:
 
     Between its slips a slide creeps, and seems to rest more than once.
     """
-    apart, longest = rests[:1], rests[0] if rests else None
+    if not rests:
+        return []
+    apart, longest = rests[:1], rests[0]
     for rest in rests[1:]:
-        assert longest is not None
         away = abs(_farthest(position, longest, rest).level - longest.level)
         if max(away, abs(rest.level - longest.level)) > least:
             apart.append(rest)
@@ -476,9 +480,9 @@ def _creep(
     products = squares = lasting = 0.0
     for landing, release in rests:
         margin = _CORE * (release - landing)
-        first, last = np.searchsorted(time, [landing + margin, release - margin])
+        first, last = time.searchsorted((landing + margin, release - margin)).tolist()
         if last - first >= 2:
-            part = time[first:last] - float(np.mean(time[first:last]))
+            part = time[first:last] - float(time[first:last].mean())
             products += float(part @ position[first:last])
             squares += float(part @ part)
             lasting += float(part[-1] - part[0])

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, Table, median
 from stickslip_ros.measures.cycle_measures import STICKING_SHARE, Cycle
 from stickslip_ros.measures.noise import medians
-from stickslip_ros.measures.parabolas import parabolas, vertex
+from stickslip_ros.measures.parabolas import slopes, vertex
 from stickslip_ros.measures.segmentation import stick_share
 
 LEAST_STICK = 0.03
@@ -27,7 +27,7 @@ class NoisySamples(Table):
 
     def row(self, time: float) -> int:
         """Return the first row that is not earlier than a time, s."""
-        return int(np.searchsorted(self.time, time))
+        return int(self.time.searchsorted(time))
 
 
 class Point(NamedTuple):
@@ -51,7 +51,7 @@ def reversals(position: FloatArray, least: float) -> list[tuple[int, int]]:
         back = np.maximum.accumulate(rest) - rest > least
         if not back.any():
             return list(zip(rows[1::2], rows[2::2], strict=False))
-        rows.append(rows[-1] + int(np.argmax(rest[: int(np.argmax(back))])))
+        rows.append(rows[-1] + int(rest[: back.argmax()].argmax()))
         course = -course
 
 
@@ -94,15 +94,15 @@ def cycle_between(
     around = samples[max(first - reach, 0) : last + reach]
     reach = max(min(reach, (len(around) - 3) // 2), 1)
     rate = (len(around) - 1) / float(around.time[-1] - around.time[0])
-    slopes = rate * parabolas(around.position, reach)[1][reach:-reach]
+    velocity = rate * slopes(around.position, reach)
     part = samples[max((3 * first - last) // 2, 0) : last + reach_beside(last, high) + 1]
     belt, times = median(part.belt), (start.time, end.time)
     stick = stick_share(part.time, part.position, belt, times, noise, step)
-    if isnan(stick) and np.abs(slopes).max() < STICKING_SHARE * abs(belt):
+    if isnan(stick) and np.abs(velocity).max() < STICKING_SHARE * abs(belt):
         stick = 0.0
     return Cycle(
         amplitude=(highest - lowest) / 2.0,
-        velocity_amplitude=float(np.ptp(slopes)) / 2.0,
+        velocity_amplitude=float(np.ptp(velocity)) / 2.0,
         midpoint=(highest + lowest) / 2.0,
         period=period,
         frequency=1.0 / period,

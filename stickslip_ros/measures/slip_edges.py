@@ -86,25 +86,24 @@ def edge(
 
 def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> tuple[float, float]:
     """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
-    inside = np.flatnonzero(np.abs(course) <= near)
-    over = course < -_OVER * near
-    over[: inside[0] if len(inside) else None] = False
-    if over.any():  # beyond the rest, from where the slide comes back
-        inside, size = inside[inside < np.argmax(over)], -float(course.min())
+    distance = np.abs(course)
+    inside, over = (distance <= near).nonzero()[0], (course < -_OVER * near).nonzero()[0]
+    over = over[over > inside[0]] if len(inside) else over[:0]
+    if len(over):  # beyond the rest, from where the slide comes back
+        inside, size = inside[inside < over[0]], -float(course.min())
     last = int(inside[-1]) if len(inside) else 0
     far = near + min(_FAR_SHARE * size, _FAR_NEARS * near)
-    beyond = np.flatnonzero(np.abs(course[last + 1 :]) > far)
-    end = last + 2 + int(beyond[0]) if len(beyond) else len(course)
-    rows = np.arange(last + 1, min(end, len(course)))
-    if len(rows) < 3:
+    beyond = (distance[last + 1 :] > far).nonzero()[0]
+    values = distance[last + 1 : last + 2 + int(beyond[0]) if len(beyond) else None]
+    if len(values) < 3:
         return last + 0.5, hypot(_ROW_ERROR, 0.3)
-    values, middle = np.abs(course[rows]), (last + 1.0 + rows[-1]) / 2.0
-    lag, roots = rows - middle, values ** (1.0 / powers)
-    offset, slope = roots.sum(axis=1) / len(rows), roots @ lag / (lag @ lag)
+    half = (len(values) - 1) / 2.0
+    lag, middle, roots = np.arange(-half, half + 1.0), last + 1.0 + half, values ** (1.0 / powers)
+    offset, slope = roots.sum(axis=1) / len(lag), roots @ lag / (lag @ lag)
     fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** powers
     squares = ((fitted - values) ** 2).sum(axis=1) + (near / 3.0) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        edges = np.where(slope > 0.0, middle - offset / slope, last)
+    rises = slope > 0.0
+    edges = middle - np.divide(offset, slope, out=np.full(len(slope), middle - last), where=rises)
     edges = np.minimum(np.maximum(edges, 0.0), last + 1.0)
     weight = (squares.min() / squares) ** 2
     weight /= weight.sum()
