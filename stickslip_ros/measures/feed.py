@@ -6,15 +6,15 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES
-from stickslip_ros.measures.noise import PRECISION, encoder_step, rises, white_noise
+from stickslip_ros.measures.noise import NOISE_SAMPLES, PRECISION, encoder_step, rises, white_noise
 from stickslip_ros.measures.segmentation import moves, stick_slip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _MOST_CYCLES = 1_000_000
-_FEWEST, _LOOK, _BLOCKS, _RANGE = 32, 4096, 8192, 8.0
-"""Samples at an end from which a standstill is told, from which noise and step are estimated;
-positions that are compared; range of the noise, in standard deviations."""
+_FEWEST, _BLOCKS, _RANGE = 32, 8192, 8.0
+"""Samples at an end from which a standstill is told; positions that are compared; range of the
+noise, in standard deviations."""
 _SAME_FEED = 0.01
 """Relative difference of two estimates of one feed."""
 _PASSES = 4
@@ -64,8 +64,8 @@ def moving_part(samples: SampleColumns) -> slice:
     if len(rows) < _FEWEST:
         return slice(0, len(samples))
     position = samples.position[rows]
-    noise = white_noise(position[: len(position) // 2][-_LOOK:])
-    least = max(1.5 * encoder_step(position[-_LOOK:]), _RANGE * noise)
+    noise = white_noise(position[: len(position) // 2][-NOISE_SAMPLES:])
+    least = max(1.5 * encoder_step(position[-NOISE_SAMPLES:]), _RANGE * noise)
     least = max(least, PRECISION * float(np.abs(position).max()))
     stays = max(len(position) // _BLOCKS, 1)
     ends = [float(np.median(part)) for part in (position[:_FEWEST], position[-_FEWEST:])]

@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, rms
-from stickslip_ros.measures.noise import encoder_step, resolved, white_noise
+from stickslip_ros.measures.noise import unresolved
 from stickslip_ros.quantities import Quantity
 from stickslip_ros.samples import LARGEST
 from stickslip_ros.text import quantity
@@ -28,8 +28,6 @@ would seem to stand, from which it is a rest."""
 _LEAST_HEIGHT, _FEWEST_SAMPLES = 1e-6, 3
 """Least height of an error, as a share of the range of the reference; fewest samples above half of
 it."""
-_NOISE_SHARE, _NOISE_ROWS, _NOISES = 1e-7, 4096, 6.0
-"""Noise below this share of the motion is none; rows that tell it; its range, in deviations."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def followed(
     Arrays have the shape (samples,), s and m; rows without a number up to 1e100, or not later
     than all before, are left out. `unit` is that of lengths in the notes, "" for none. With noise,
     heights are those of the error smoothed over a quarter of its width. What the sensor does not
-    tell, see `resolved`, or the samples do not, is None.
+    tell, see `unresolved`, or the samples do not, is None.
     """
     known = (np.abs(reference) <= LARGEST) & (np.abs(position) <= LARGEST)
     known &= time > np.maximum.accumulate(np.append(-np.inf, time))[:-1]
@@ -110,10 +108,7 @@ def followed(
         reference = np.interp(time, time[changes], reference[changes])
     rows = _turning_rows(reference)
     part = error[rows[1] if len(rows) > 2 else 0 :]
-    step, noise = encoder_step(position), white_noise(position[-_NOISE_ROWS:])
-    if max(step, noise) <= _NOISE_SHARE * float(np.ptp(position)):
-        step = noise = 0.0
-    limit = resolved(step, noise) or _NOISES * noise
+    limit = unresolved(position)
     ways = [(a, b, moves[a:b].max(), abs(reference[b] - reference[a])) for a, b in pairwise(rows)]
     smooth = [(a, b) for a, b, step, way in ways if step < _JUMP * way]
     turns = [*_reversals(time, reference, position, smooth, limit)]

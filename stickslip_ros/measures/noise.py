@@ -26,11 +26,15 @@ FEWEST_SAMPLES = 32
 PRECISION, ROUNDING = 1e-12, 1e-9
 """Noise below this share of the largest values is rounding of the numbers, not of a sensor; the
 rounding of numbers in tables, likewise."""
+NOISE_SHARE = 1e-7
+"""Noise below this share of the motion is rounding, or an imperfection of the estimate."""
+NOISE_SAMPLES = 4096
+"""Number of samples from which the noise of a whole record is estimated."""
 _STEP_DEVIATION = 1e-3
 """Largest deviation of whole numbers of steps."""
 _DIVISIONS = 3
 """Number of divisions in which a step is found."""
-_RANGE = 6.0
+NOISE_RANGE = 6.0
 """Range of the noise, in standard deviations."""
 
 
@@ -99,7 +103,15 @@ def resolved(step: float, noise: float = 0.0) -> float:
 
     Rounding to the step is noise, too.
     """
-    return step + _RANGE * max(noise, step / sqrt(12.0)) if step else 0.0
+    return step + NOISE_RANGE * max(noise, step / sqrt(12.0)) if step else 0.0
+
+
+def unresolved(position: FloatArray) -> float:
+    """Return the range, m, within which positions tell no motion, by their own step and noise."""
+    step, noise = encoder_step(position), white_noise(position[-NOISE_SAMPLES:])
+    if max(step, noise) <= NOISE_SHARE * float(np.ptp(position)):
+        return 0.0
+    return resolved(step, noise) or NOISE_RANGE * noise
 
 
 def medians(signal: FloatArray) -> FloatArray:

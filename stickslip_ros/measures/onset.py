@@ -85,7 +85,7 @@ def mean_decays(ring_downs: Sequence[RingDown]) -> list[FeedDecay]:
     """Return the mean decay of ring-downs at equal belt speeds, in order of the belt speed.
 
     It is weighted by the inverse squares of the errors. Where three or more scatter less than these
-    errors, the rest is common to all, and no mean reduces it.
+    errors, the rest is common to all, as the rounding of equal taps is, and no mean reduces it.
     """
     groups: list[list[RingDown]] = []
     for ring_down in sorted(ring_downs, key=lambda ring_down: ring_down.belt_speed):
@@ -102,11 +102,7 @@ def mean_decays(ring_downs: Sequence[RingDown]) -> list[FeedDecay]:
 
 
 def _mean(values: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the weighted mean of values with errors, and its error.
-
-    Equal taps have equal errors of rounding, which no mean reduces: what the values scatter less
-    than by their errors is common to all.
-    """
+    """Return the weighted mean of values with errors, and its error; see `mean_decays`."""
     value, error = np.array(values).T
     weight, count = error**-2.0, len(value)
     total = float(weight.sum())

@@ -71,9 +71,8 @@ def _notes(run: RunMeter) -> list[str]:
     if run.timing is not None and (complaint := run.timing.warning()):
         doubt = "" if run.timing.in_time else "the regime is doubtful: "
         notes.append(doubt + complaint)
-    if motion.mixed or not motion.samples or late == inf:
-        return notes
-    if late <= LONGEST_GAP * motion.duration / motion.samples:
+    known = late < inf and not motion.mixed and motion.samples > 0
+    if not known or late <= LONGEST_GAP * motion.duration / motion.samples:
         return notes
     if late > motion.duration:
         notes.append("the stamps of the control forces are later than those of all samples")

@@ -306,20 +306,9 @@ class SampleMeter:
         return self.reading._replace(stick_speed=speed)
 
     @property
-    def _by_breakpoints(self) -> bool:
-        """Whether breakpoints are needed: the samples may be exact, or an observer wants them."""
-        return not self.reading.noisy or self._observer is not None
-
-    @property
     def _by_reversals(self) -> bool:
         """Whether single cycles are those of reversals: velocities do not tell a rest."""
         return self.noisy or (self.reading.noisy is None and self._speeds.belt == 0.0)
-
-    @property
-    def _by_window(self) -> bool:
-        """Whether a window is needed: for samples with noise, few in a cycle, or beside a guide."""
-        few = self._per_cycle < FEW_SAMPLES
-        return self.reading.noisy is not False or self._speeds.belt == 0.0 or few
 
     def _feed_segment(self, samples: SampleColumns) -> list[Cycle]:
         """Feed the meters with samples that continue the motion, from the last one fed on."""
@@ -330,13 +319,14 @@ class SampleMeter:
         self.drift.position.feed(time[new], samples.position[new])
         self._speeds.slip = max(self._speeds.slip, float(np.abs(samples.velocity - belt).max()))
         breakpoints, cycles = None, list[Cycle]()
-        if self._by_breakpoints:
+        if not self.reading.noisy or self._observer is not None:
             breakpoints = self._breakpoints(samples, time)
             self._meter.within = self.reading.within
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / median(np.diff(time))
-        if self._by_window:
+        few = self._per_cycle < FEW_SAMPLES
+        if self.reading.noisy is not False or self._speeds.belt == 0.0 or few:
             under_noise = self._window.feed(
                 time[new], samples.position[new], samples.velocity[new], belt[new]
             )

@@ -10,6 +10,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, STALE_PERIODS, Cycle
 from stickslip_ros.measures.noise import (
+    NOISE_SHARE,
     PRECISION,
     ROUNDING,
     encoder_step,
@@ -38,8 +39,6 @@ which the cycles of a window are kept; in which the first cycle is looked for.""
 _MARGIN, _UNKNOWN = 64, 2
 """Number of samples that are kept before the window, for the fits at its start; of the last ones
 that may still be impulses."""
-_ROUNDING_SHARE = 1e-7
-"""Noise below this share of the motion is rounding, or an imperfection of the estimate."""
 
 
 @dataclass(frozen=True)
@@ -169,15 +168,15 @@ class WindowMeter:
             course = position - float(belt[-1]) * (recent.time - recent.time[0])
             step = max(step, encoder_step(course, ROUNDING))
         moved = float(np.ptp(medians(position)))
-        if noise > max(_ROUNDING_SHARE * moved, PRECISION * float(np.abs(position).max())):
+        if noise > max(NOISE_SHARE * moved, PRECISION * float(np.abs(position).max())):
             self.noise, self.noisy = noise, True
         if step > 0.0:
             self.step = min(self.step or inf, step)
             # Steps that divide the travel of a sample leave no noise where it is looked for.
-            self.noisy |= self.step > _ROUNDING_SHARE * moved
+            self.noisy |= self.step > NOISE_SHARE * moved
         if not self.noisy:
             fastest = float(np.abs(recent.velocity).max())
-            least = max(_ROUNDING_SHARE * fastest, PRECISION * float(np.abs(belt).max()))
+            least = max(NOISE_SHARE * fastest, PRECISION * float(np.abs(belt).max()))
             self.noisy = white_noise(recent.velocity) > least
 
     def _advance(self) -> list[Cycle]:

@@ -16,19 +16,22 @@ from math import ceil, hypot, inf, nan, sqrt
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.measures.cycle_measures import Cycle, CycleMeans, Measures
-from stickslip_ros.measures.noise import FEWEST_SAMPLES, ROUNDING, encoder_step, white_noise
+from stickslip_ros.measures.cycle_measures import LEAST_CYCLES, Cycle, CycleMeans, Measures
+from stickslip_ros.measures.noise import (
+    FEWEST_SAMPLES,
+    NOISE_RANGE,
+    NOISE_SAMPLES,
+    ROUNDING,
+    encoder_step,
+    white_noise,
+)
 from stickslip_ros.measures.parabolas import parabolas
 from stickslip_ros.measures.slip_edges import Rest, SlipEdges, edge, slip_edges
 
-_LOOK = 4096
-"""Number of last samples from which noise and step are estimated."""
 _REST_SHARE = 0.5
 """Speed up to which a slide may rest, in mean speeds."""
 _FEWEST_REACHES = 16
 """Number of samples, in lengths of a mean, from which rests are looked for."""
-_FEWEST_CYCLES = 3
-"""Number of cycles that repeat."""
 _SURE = 3.0
 """Standard errors by which a difference is no error."""
 _LEAST_CREEP = 0.01
@@ -222,9 +225,9 @@ def resting_velocity(time: FloatArray, position: FloatArray) -> float:
     fifth of the velocities, by the change of two means (the shorth: D. F. Andrews et al., Robust
     Estimates of Location, 1972).
     """
-    noise = white_noise(position[-_LOOK:])
-    step = encoder_step(position[-_LOOK:])
-    speed = _mean_speed(time, position, max(step, 6.0 * noise))
+    last = position[-NOISE_SAMPLES:]
+    noise, step = white_noise(last), encoder_step(last)
+    speed = _mean_speed(time, position, noise, step)
     period = float(time[-1] - time[0]) / (len(time) - 1)
     reach = _reach(speed * period, noise, step)
     if speed == 0.0 or len(time) < _FEWEST_REACHES * reach:
@@ -247,9 +250,9 @@ def _measured(
     if len(time) < FEWEST_SAMPLES or np.any(np.diff(time) < 0.0) or not time[-1] > time[0]:
         return None
     relative = position - guide_velocity * (time - time[0])
-    step = max(step, encoder_step(relative[-_LOOK:], ROUNDING))
-    noise = white_noise(relative[-_LOOK:])
-    speed = abs(belt_velocity) or _mean_speed(time, relative, max(step, 6.0 * noise))
+    last = relative[-NOISE_SAMPLES:]
+    noise, step = white_noise(last), max(step, encoder_step(last, ROUNDING))
+    speed = abs(belt_velocity) or _mean_speed(time, relative, noise, step)
     sample_period = float(time[-1] - time[0]) / (len(time) - 1)
     rests = _rests_apart(relative, speed * sample_period, noise, step)
     starts = _cycle_starts(time, rests)[-most_cycles - 1 :]
@@ -260,7 +263,7 @@ def _measured(
     if used[0].release - float(time[0]) < _CUT * used[0].duration:  # they begin after it
         used, starts = used[starts[1] - starts[0] :], starts[1:]
     release = np.array([used[start - starts[0]].release for start in starts])
-    if len(starts) <= _FEWEST_CYCLES or not np.all(np.diff(release) > 0.0):  # times that repeat
+    if len(starts) <= LEAST_CYCLES or not np.all(np.diff(release) > 0.0):  # times that repeat
         return None
     del used[-1]
     period = float(release[-1] - release[0]) / (len(release) - 1)
@@ -315,11 +318,11 @@ def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, resolution:
     )
 
 
-def _mean_speed(time: FloatArray, position: FloatArray, least: float) -> float:
-    """Return the mean speed of what moves by more than `least`, m, to and fro, m/s."""
+def _mean_speed(time: FloatArray, position: FloatArray, noise: float, step: float) -> float:
+    """Return the mean speed of what moves to and fro by more than step and noise, m/s."""
     block = max(len(position) // _BLOCKS, 1)
     course = position[: len(position) // block * block].reshape(-1, block).mean(axis=1)
-    changes = np.flatnonzero(moves(course, least))
+    changes = np.flatnonzero(moves(course, max(step, NOISE_RANGE * noise)))
     return float(np.abs(np.diff(course[changes])).sum()) / float(time[-1] - time[0])
 
 
@@ -437,12 +440,12 @@ def _cycle_starts(time: FloatArray, rests: list[Rest]) -> list[int]:
         main = main[forward]
         forward = forward[forward]
     release = time[[rests[number].last for number in main]]
-    if len(main) <= _FEWEST_CYCLES:
+    if len(main) <= LEAST_CYCLES:
         return []
     gaps = np.diff(release)
     breaks = (gaps > _LONG_GAP * np.median(gaps)) | (forward[1:] != forward[:-1])
     parts = np.split(main, np.flatnonzero(breaks) + 1)
-    return next((part.tolist() for part in parts[::-1] if len(part) > _FEWEST_CYCLES), [])
+    return next((part.tolist() for part in parts[::-1] if len(part) > LEAST_CYCLES), [])
 
 
 def _extremes(time: FloatArray, position: FloatArray, rows: list[int], width: float) -> FloatArray:

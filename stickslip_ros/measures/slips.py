@@ -21,7 +21,7 @@ _LEAST_SAMPLES = 8
 """Number of samples for the fit of a stick."""
 _MOST_SLIPS = 100_000
 """Number of slips in a report: the last ones."""
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_QUANTILES = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
 
 
 class Slip(NamedTuple):
@@ -193,12 +193,11 @@ def _distribution(values: FloatArray) -> dict[str, float] | None:
     values = values[np.isfinite(values)]
     if len(values) == 0:
         return None
-    quantiles = np.quantile(values, _QUANTILES).tolist()
-    named = dict(zip(("q05", "q25", "median", "q75", "q95"), quantiles, strict=True))
+    quantiles = np.quantile(values, [*_QUANTILES.values()]).tolist()
     spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
     return {
         "mean": float(np.mean(values)),
         "standard_error": spread / len(values) ** 0.5,
         "standard_deviation": spread,
-        **named,
+        **dict(zip(_QUANTILES, quantiles, strict=True)),
     }
