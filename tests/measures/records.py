@@ -30,6 +30,14 @@ def milliseconds(count: int) -> npt.NDArray[np.int64]:
     return np.arange(count) * 1_000_000
 
 
+def behind_a_play(course: npt.NDArray[np.float64], play: float) -> npt.NDArray[np.float64]:
+    """Return what stands until a course is more than a play away from it, on either side."""
+    place = course.copy()
+    for row in range(1, len(course)):
+        place[row] = min(max(place[row - 1], course[row] - play), course[row] + play)
+    return place
+
+
 def feed(meter: SampleMeter, samples: SampleColumns, starts: Sequence[int] = ()) -> list[Cycle]:
     """Feed a meter in blocks with these starts; return the cycles that it finds."""
     ends = [*starts, len(samples)]

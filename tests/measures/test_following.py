@@ -7,6 +7,7 @@ import pytest
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.following import Followed, followed
+from tests.measures.records import behind_a_play
 
 RADIUS, LAG = 0.05, 40e-6
 OMEGA = 2.0 * pi * 0.25
@@ -23,14 +24,6 @@ def told(time: FloatArray, reference: FloatArray, position: FloatArray) -> Follo
     return found
 
 
-def with_play() -> FloatArray:
-    """Return the circle behind a play: the slide stands until the reference is 2 LAG away."""
-    position = CIRCLE.copy()
-    for row in range(1, len(position)):
-        position[row] = np.clip(position[row - 1], CIRCLE[row] - LAG, CIRCLE[row] + LAG)
-    return position
-
-
 def with_spikes(time: FloatArray, lag: float, sign: float = 1.0) -> FloatArray:
     """Return the circle with a spike after each reversal and a lag (m) at its largest speed."""
     error = lag * np.cos(OMEGA * time)
@@ -41,7 +34,7 @@ def with_spikes(time: FloatArray, lag: float, sign: float = 1.0) -> FloatArray:
 
 
 def test_a_play_stays_behind_and_rests_until_the_reference_is_through_it() -> None:
-    found = told(TIME, CIRCLE, with_play())
+    found = told(TIME, CIRCLE, behind_a_play(CIRCLE, LAG))
     assert found.notes == []
     values = found.values
     assert values.peak_following_error == pytest.approx(LAG)

@@ -11,7 +11,7 @@ from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.options import SettlingOptions
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle
 from stickslip_ros.studies.simulate import sensor_meter, simulate
-from tests.measures.records import columns, fed
+from tests.measures.records import behind_a_play, columns, fed
 
 NOISY = SampleAssumptions(noisy=True)
 PERIOD = 0.0639242
@@ -152,9 +152,7 @@ def test_an_axis_that_stays_where_it_turns_has_no_pure_slip(
 ) -> None:
     """It follows a circle on a guide at rest, through a play: it rests in 2 % of the time."""
     time = np.arange(8000) / 500.0
-    position = 0.05 * np.sin(np.pi / 2.0 * time)
-    for row in range(1, len(time)):
-        position[row] += min(max(position[row - 1] - position[row], -play), play)
+    position = behind_a_play(0.05 * np.sin(np.pi / 2.0 * time), play)
     found = measured(time, np.round(position, 8), belt=0.0)
     assert found.regime is regime
     assert (found.stick_fraction is None) == (regime is None)
@@ -212,10 +210,7 @@ def test_standard_errors_cover_the_rounding_of_an_encoder_without_noise(
 def test_a_flat_top_with_a_corner_has_no_amplitude_beyond_it() -> None:
     """The error of an axis on a circle that stays at its reversals until it is 40 um behind."""
     command = 0.05 * np.sin(2.0 * np.pi * 0.25 * 0.002 * np.arange(8000))
-    place = [0.0]
-    for each in command[1:].tolist():
-        place.append(min(max(place[-1], each - 4e-5), each + 4e-5))
-    time = 0.002 * np.arange(len(place))
-    found = measured(time, command - np.array(place), reading=UNKNOWN, belt=0.0)
+    time = 0.002 * np.arange(len(command))
+    found = measured(time, command - behind_a_play(command, 4e-5), reading=UNKNOWN, belt=0.0)
     assert found.amplitude == pytest.approx(4e-5, rel=1e-3)
     assert found.period == pytest.approx(4.0, rel=1e-6)

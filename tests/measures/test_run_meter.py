@@ -15,27 +15,6 @@ def decaying(count: int) -> ForceColumns:
     return ForceColumns(10**9 + PERIOD * numbers, (-1.0) ** numbers / (1.0 + numbers))
 
 
-def test_the_report_of_a_run() -> None:
-    meter = RunMeter(window=5)
-    forces = decaying(300)
-    time = (forces.stamp - forces.stamp[0]) * 1e-9
-    # Two and a quarter turns at 0.75 Hz, seen from the trough on.
-    angle = 2.0 * np.pi * 0.75 * time
-    position, velocity = -np.cos(angle), 1.5 * np.pi * np.sin(angle)
-    meter.motion.feed(columns(forces.stamp, position, velocity, 6.0))
-    meter.force.feed(forces)
-    report = report_of(meter)
-    assert report["samples"] == 300
-    assert report["lost_samples"] == 0
-    assert report["duration"] == pytest.approx(2.99)
-    assert report["peak_force"] == 1.0
-    assert report["regime"] == "pure_slip"
-    assert report["cycles"] == 1
-    assert report["amplitude"] == pytest.approx(1.0, rel=1e-6)
-    assert report["frequency"] == pytest.approx(0.75, rel=1e-6)
-    assert report["velocity_amplitude"] == pytest.approx(1.5 * np.pi, rel=1e-6)
-
-
 def test_what_was_sent_and_what_acted_are_measured_apart() -> None:
     meter = RunMeter(window=5, dropped_known=True)
     forces = decaying(300)
