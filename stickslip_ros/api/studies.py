@@ -131,9 +131,9 @@ class Sweep(Points):
         Parameters
         ----------
         colour : str
-            What the cells of a map, over two parameters, have their colours by: "regime", or a
-            measure of `columns` that is a number, such as "amplitude". The diagram of one
-            parameter takes "regime" only.
+            What colours the cells of a map (over two parameters): "regime", or a measure of
+            `columns` that is a number, such as "amplitude". The diagram of one parameter takes
+            "regime" only.
         style : {"screen", "paper", "paper-double"}
             What the figure is for: a screen, or one column or two of a journal.
 

@@ -59,8 +59,8 @@ _COORDINATES = {
 class Straightening:
     """Numbers in which fits are nearly linear, which a search has in place of coordinates.
 
-    They replace these where all are free, and those of `with_free`, too. Both functions take the
-    fastest speed.
+    They replace these where all of them, and those of `with_free`, are free. Both functions take
+    the fastest speed, too.
     """
 
     names: Mapping[str, str]

@@ -1,6 +1,6 @@
 """Ring-downs: decay rate and frequency of the vibration after a tap or a step of the feed."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import inf, pi, sqrt
 from typing import NamedTuple
@@ -22,8 +22,10 @@ _LARGEST_SPEED, _BELT_CHANGE, _BELT_STEP = 0.3, 0.05, 0.01
 """Largest speed of a vibration far from sticking, change of the belt speed in a ring-down, and in
 two periods, in belt speeds."""
 _AMPLITUDE_EFFECT, _DAMPING_RATIO, _UNLIKE = 5.0, 0.02, 0.1
-"""Likely change of the decay rate at a speed amplitude of a belt speed, in decay rates of at least
-this damping ratio, before the data tell it; largest residual beside the noise, in amplitudes."""
+"""Prior standard deviation of the change of the decay rate at a speed amplitude of a belt speed, in
+decay rates of at least this damping ratio; largest residual beside the noise, in amplitudes."""
+_MOST_STEPS, _MOST_GROWTH = 40, 20.0
+"""Steps after which a search has not converged; logarithm of the growth in a window, at most."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def ring_downs(
 
     Taps and steps are found where the vibration changes by more than a decay does; their impulse
     need not be known. Between them a sine whose amplitude decays by r' = -(s + q r^2) r (Nayfeh,
-    Mook, Nonlinear Oscillations, section 3.3) is fitted by Gauss-Newton least squares.
+    Mook, Nonlinear Oscillations, section 3.3) is fitted by least squares.
 
     Positions are in m, belt velocities in m/s, the sample period and the time `after` which they
     start in s.
@@ -154,15 +156,15 @@ def _fit(
 
 
 class _Fit(NamedTuple):
-    """Least squares of `_columns`; amplitudes in those of the samples."""
+    """Least squares of `_columns`, in the unit of the samples."""
 
     shape: FloatArray
     linear: FloatArray
     """Coefficients of the columns."""
     slopes: FloatArray
-    """Slopes of the fit by its shape."""
+    """Derivatives of the residuals by the shape."""
     effect: float
-    """Standard deviation of the effect of the amplitude before the data tell it."""
+    """Prior standard deviation of the effect of the amplitude."""
 
     @property
     def amplitude(self) -> float:
@@ -183,31 +185,67 @@ def _best(
     The coefficients are the best ones of each shape (variable projection: G. Golub, V. Pereyra,
     SIAM Journal on Numerical Analysis 10, 1973).
     """
-    from scipy.optimize import least_squares  # takes long to import
 
     def linear(shape: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.lstsq(_columns(time, shape), x)[0], np.float64)
+        return _least_squares(_columns(time, shape), x)
 
-    def residual(shape: FloatArray, weight: float) -> FloatArray:
-        return np.append(x - _columns(time, shape) @ linear(shape), weight * shape[2])
+    def residual(shape: FloatArray) -> FloatArray:
+        return np.append(x - _columns(time, shape) @ linear(shape), noise / effect * shape[2])
 
-    best = None
+    best, steps = None, float(shape[1]) * np.array([1e-5, 1e-6, 1e-5])
     for _ in range(2):  # what the amplitude may do follows from the fit
         least = max(abs(shape[0]), _DAMPING_RATIO * shape[1])
         effect = _AMPLITUDE_EFFECT * least * (shape[1] * amplitude / belt_speed) ** 2
-        found = least_squares(residual, shape, "3-point", x_scale="jac", args=(noise / effect,))
-        if not found.success:
+        found = _minimum(residual, shape, steps)
+        if found is None or -found[0] * time[-1] >= _MOST_GROWTH:
             return None
-        best = _Fit(found.x, linear(found.x), found.jac[:-1], effect)
+        best = _Fit(found, linear(found), _slopes(residual, found, steps)[:-1], effect)
         shape, amplitude = best.shape, best.amplitude
     return best
+
+
+def _minimum(
+    residual: Callable[[FloatArray], FloatArray], point: FloatArray, steps: FloatArray
+) -> FloatArray | None:
+    """Return where residuals have the least sum of squares, near a point; None if it is not found.
+
+    The search is that of D. Marquardt (SIAM Journal on Applied Mathematics 11, 1963), with
+    derivatives by differences over these steps. SciPy's would be imported while a run is recorded,
+    which takes too long.
+    """
+    left, damping = residual(point), 1e-3
+    for _ in range(_MOST_STEPS):
+        slopes = _slopes(residual, point, steps)
+        damped = np.diag(sqrt(damping) * np.linalg.norm(slopes, axis=0))
+        change = _least_squares(np.vstack([slopes, damped]), -np.pad(left, (0, len(point))))
+        tried = residual(point + change)
+        if tried @ tried < left @ left:
+            point, left, damping = point + change, tried, damping / 10.0
+        else:
+            damping *= 10.0
+        if np.all(np.abs(change) < steps / 10.0):
+            return point
+    return None
+
+
+def _slopes(
+    residual: Callable[[FloatArray], FloatArray], point: FloatArray, steps: FloatArray
+) -> FloatArray:
+    """Return the derivatives of residuals by the coordinates of a point, as columns."""
+    sides = [(residual(point + step), residual(point - step)) for step in np.diag(steps)]
+    return np.column_stack([after - before for after, before in sides]) / (2.0 * steps)
+
+
+def _least_squares(design: FloatArray, wanted: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(design, wanted)[0], np.float64)
 
 
 def _columns(time: FloatArray, shape: FloatArray) -> FloatArray:
     """Return the columns of a line and of a sine that decays: r' = -(s + q r^2) r, r(0) = 1."""
     decay, omega, effect = shape
-    spent = -np.expm1(-2.0 * decay * time) / (2.0 * decay) if abs(decay) > 1e-9 else time
-    size = np.exp(-decay * time) / np.sqrt(np.maximum(1.0 + 2.0 * effect * spent, 0.05))
+    growth = np.minimum(-decay * time, _MOST_GROWTH)
+    spent = -np.expm1(2.0 * growth) / (2.0 * decay) if abs(decay) > 1e-9 else time
+    size = np.exp(growth) / np.sqrt(np.maximum(1.0 + 2.0 * effect * spent, 0.05))
     line = np.ones_like(time), time - time[-1] / 2.0
     return np.column_stack([*line, size * np.cos(omega * time), size * np.sin(omega * time)])
 

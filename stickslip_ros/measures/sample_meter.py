@@ -319,12 +319,14 @@ class SampleMeter:
         self.drift.position.feed(time[new], samples.position[new])
         self._speeds.slip = max(self._speeds.slip, float(np.abs(samples.velocity - belt).max()))
         breakpoints, cycles = None, list[Cycle]()
+        # The samples may be exact, or an observer wants breakpoints.
         if not self.reading.noisy or self._observer is not None:
             breakpoints = self._breakpoints(samples, time)
             self._meter.within = self.reading.within
             cycles = self._meter.feed(breakpoints, float(belt[-1]), self._speeds.belt)
             if cycles and len(time) > 1:
                 self._per_cycle = cycles[-1].period / median(np.diff(time))
+        # For samples with noise, few in a cycle, or beside a guide at rest.
         few = self._per_cycle < FEW_SAMPLES
         if self.reading.noisy is not False or self._speeds.belt == 0.0 or few:
             under_noise = self._window.feed(

@@ -70,7 +70,7 @@ _OTHER_SPEED = 0.1
 _SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 _MOST_NEAR = 0.4
-"""Share of the samples near an extreme, above which they do not tell whether it rests there."""
+"""Share of the samples near an extreme above which a rest there is hidden."""
 _NEAR_STEPS, _LEAST_DWELL, _DWELL_GROWTH = 4.0, 4.0, 1.25
 """Distance from an extreme, in steps, that is near; number of samples near it that tell a rest;
 growth of their number with four times the distance below which they do: it is two in a parabola."""
@@ -87,30 +87,32 @@ def measure(
     segmented = rests_and_slips(window, reading)
     if segmented is None or segmented.passes:
         measures, fit = _by_reversals(window, reading, quick=quick)
-        return _as_it_passes(window, measures, fit), fit
+        return _no_surer_than_told(window, measures, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
-            return _as_it_passes(window, _not_surer(refined, segmented), fit), fit
+            return _no_surer_than_told(window, _not_surer(refined, segmented), fit), fit
     measures = segmented_measures(window, segmented)
     return measures if segmented.rests else undecided(measures), None
 
 
-def _as_it_passes(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
-    """Return measures that do not deny a stick of a slide that passes the speed of the belt.
+def _no_surer_than_told(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
+    """Return measures without a regime where a rest may be hidden, or may be none.
 
-    Nor that of one which may rest where it turns.
-    Nor do they claim one at a speed so far from that of the belt that no calibration errs by it.
+    It may be hidden where the slide passes the speed of the belt, and where it turns on a guide at
+    rest. It may be none at a speed so far from that of the belt that no calibration errs by it.
     """
-    passes = fit is not None and fit.overtakes and measures.regime is Regime.PURE_SLIP
-    if fit is not None and fit.stick is not None:
-        part = window if len(window.samples) or window.before is None else window.before
-        belt = abs(float(part.samples.belt[-1]))
-        passes |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
-    passes |= measures.regime is Regime.PURE_SLIP and _may_rest_where_it_turns(window)
-    return undecided(measures) if passes else measures
+    slips = measures.regime is Regime.PURE_SLIP
+    doubtful = slips and _may_rest_where_it_turns(window)
+    if fit is not None:
+        doubtful |= slips and fit.overtakes
+        if fit.stick is not None:
+            part = window if len(window.samples) or window.before is None else window.before
+            belt = abs(float(part.samples.belt[-1]))
+            doubtful |= abs(fit.stick.fit.belt_speed - belt) > _OTHER_SPEED * belt
+    return undecided(measures) if doubtful else measures
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
@@ -129,22 +131,32 @@ def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
 
 def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | None:
     """Return the rests and slips that go on at the end of the run; None without them."""
+    if not _may_segment(window, reading):
+        return None
+    return _lasting(window, float(window.samples.belt[-1]))
+
+
+def _may_segment(window: Window, reading: SampleAssumptions) -> bool:
+    """Return whether rests are those relative to one velocity."""
     samples = window.samples
-    if len(samples) < FEWEST_SAMPLES or reading.stick_speed or not _even(samples.belt):
+    return len(samples) >= FEWEST_SAMPLES and not reading.stick_speed and _even(samples.belt)
+
+
+def _lasting(window: Window, velocity: float) -> StickSlip | None:
+    """Return rests at a velocity, m/s, and slips, that go on at the end of the run."""
+    samples = window.samples
+    found = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
+    if found is None:
         return None
-    belt = float(samples.belt[-1])
-    segmented = stick_slip(samples.time, samples.position, belt, window.most_cycles, window.step)
-    if segmented is None:
-        return None
-    since = float(samples.time[-1]) - segmented.end
-    return segmented if since <= STALE_PERIODS * segmented.cycle.period else None
+    since = float(samples.time[-1]) - found.end
+    return found if since <= STALE_PERIODS * found.cycle.period else None
 
 
 def _may_rest_where_it_turns(window: Window) -> bool:
     """Return whether a slide on a guide at rest may rest where it turns.
 
     The number of samples near an extreme grows with the root of the distance, unless it rests.
-    Where most samples are near one, noise or steps hide a rest.
+    Where many samples are near one, noise or steps hide a rest.
     """
     samples, near, far = window.samples, 0, 0
     if samples.belt.any():
@@ -171,11 +183,13 @@ def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, floa
 
     Also the share of the time in which it does. None where there is no other one.
     """
-    segmented, samples = rests_and_slips(window, reading), window.samples
-    if len(samples) < FEWEST_SAMPLES or (segmented is not None and segmented.rests):
+    if not _may_segment(window, reading):
+        return None
+    on_belt, samples = rests_and_slips(window, reading), window.samples
+    if on_belt is not None and on_belt.rests:
         return None
     velocity = resting_velocity(samples.time, samples.position)
-    on_guide = stick_slip(samples.time, samples.position, velocity, window.most_cycles, window.step)
+    on_guide = _lasting(window, velocity)
     share = 0.0 if on_guide is None or not on_guide.rests else on_guide.cycle.stick_fraction
     return (velocity, share) if share > _REST_SHARE else None
 

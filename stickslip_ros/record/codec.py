@@ -78,10 +78,11 @@ _HELD = struct.Struct("<4s iI 9s")
 def joint_state_packer(
     *names: str, frame: str = ""
 ) -> Callable[[int, Sequence[float], Sequence[float], Sequence[float]], bytes]:
-    """Return what serializes a sensor_msgs/msg/JointState of joints in this order, and its frame.
+    """Return a function that serializes a sensor_msgs/msg/JointState of joints in this order.
 
-    It takes the stamp in ns, and for each joint a position in m, a velocity in m/s and an effort in
-    N. It raises MessageError for a stamp outside ROS time (32-bit seconds).
+    It takes the stamp in ns, then the positions in m, velocities in m/s and efforts in N, one of
+    each joint. It raises MessageError for a stamp outside ROS time (32-bit seconds). `frame` is the
+    frame of the header.
     """
     (layout, joints), n = _joint_state_structure(*names, frame=frame), len(names)
 
@@ -94,7 +95,7 @@ def joint_state_packer(
 
 
 pack_joint_state = joint_state_packer(SLIDE, BELT)
-"""Serializes a joint state of slide and belt."""
+"""Serializes a joint state of slide and belt, see `joint_state_packer`."""
 
 
 def pack_reference(stamp: int, reference: Reference) -> bytes:

@@ -14,6 +14,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import UNBOUNDED_BELT_SPEEDS, Regime
 from stickslip_ros.measures.feed import moving_part, relative_to_feed
 from stickslip_ros.measures.following import Followed, followed
+from stickslip_ros.measures.noise import FEWEST_SAMPLES
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.measures.run_report import report_of
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
@@ -168,10 +169,11 @@ class RunFeed:
                 f"relative to a guide at {speed} the slide rests {share:.0%} of the time, and "
                 "relative to the belt it does not: with this belt velocity the regime is known"
             )
-        if report["regime"] is None and report["period"] is None:
+        unknown = report["regime"] is None and report["period"] is None and not motion.mixed
+        if unknown and motion.samples >= FEWEST_SAMPLES:
             return (
-                "the regime is not known: no three cycles repeat up to the end, and the slide does "
-                "not stay at rest"
+                "the regime is not known: up to the end the slide neither stands, nor slides "
+                "steadily, nor repeats one vibration"
             )
         if report["regime"] != Regime.PURE_SLIP:
             return None

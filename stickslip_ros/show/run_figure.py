@@ -354,20 +354,21 @@ class _OneRun(_Panels):
         history = self._history
         force = "control force and disturbance" if self._disturbed else "control force"
         sticks = "sticks" if self.short else "sticks (paler: part of the time)"
-        visible: dict[Artist, bool] = {
-            Line2D([], [], **MOTION, label="slide"): True,
-            Line2D([], [], **BELT, label="belt speed"): True,
-            Line2D([], [], **POINT | _REST, label="equilibrium"): self._balanced is not None,
-            Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks): True,
-            Line2D([], [], **_CONTROL, label=force): len(history.control) > 0,
-            Line2D([], [], **_FRICTION, label="friction force"): len(history.friction) > 0,
-            Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"): True,
-            Line2D([], [], **HELD, label="no new force: last one"): self.holds,
-            Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"): (
-                len(history.dropped) > 0
+        entries: list[tuple[Artist, bool]] = [
+            (Line2D([], [], **MOTION, label="slide"), True),
+            (Line2D([], [], **BELT, label="belt speed"), True),
+            (Line2D([], [], **POINT | _REST, label="equilibrium"), self._balanced is not None),
+            (Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks), True),
+            (Line2D([], [], **_CONTROL, label=force), len(history.control) > 0),
+            (Line2D([], [], **_FRICTION, label="friction force"), len(history.friction) > 0),
+            (Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"), True),
+            (Line2D([], [], **HELD, label="no new force: last one"), self.holds),
+            (
+                Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"),
+                len(history.dropped) > 0,
             ),
-        }
-        return [entry for entry, is_visible in visible.items() if is_visible]
+        ]
+        return [entry for entry, is_shown in entries if is_shown]
 
 
 class _SeveralRuns(_Panels):

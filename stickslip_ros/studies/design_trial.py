@@ -10,9 +10,9 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.constants import LARGEST, SMALLEST
 from stickslip_ros.model.control import ControlLaw, Washout
 from stickslip_ros.model.drive import Drive, number_text
-from stickslip_ros.quantities import Quantity, quantities_of
+from stickslip_ros.quantities import Quantity
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.case_outcome import OUTCOMES, Disturbance, simulate_case
+from stickslip_ros.studies.case_outcome import Disturbance, simulate_case
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Rest, Vibration
 from stickslip_ros.studies.drive_loops import DriveLoops, linear_part
 from stickslip_ros.studies.goal import Goal
@@ -158,10 +158,6 @@ class Check:
     """Motion and force that noise and rounding leave at rest, simulated; of a vibration only."""
 
 
-_SIMULATED = quantities_of(Check).keys() & OUTCOMES.keys()
-"""What a check has of the outcome of a simulated case."""
-
-
 class Trial:
     """Checks of control laws under disturbances, and with the vibration to catch."""
 
@@ -254,7 +250,9 @@ class Trial:
                 both = outcome.rms_velocity, FEED_TOLERANCE * abs(check.belt_speed)
                 rms, allowed = (number_text(drive, value, "m/s") for value in both)
                 reason = f"{reason}: its rms velocity is {rms}, and must be at most {allowed}"
-        values = {name: getattr(outcome, name) for name in _SIMULATED}
+        measures = ("held", "settling_time", "disturbed_force", "peak_force")
+        names = (*measures, "rms_velocity", "mean_force", "rms_force")
+        values = {name: getattr(outcome, name) for name in names}
         return replace(check, disturbance=str(disturbance), reason=reason, **values)
 
     def throw_from_high_speeds(self, law: Any) -> tuple[str | None, str | None]:

@@ -172,8 +172,11 @@ def _ranges(
         if (before > 0.0) != (now > 0.0)
     ]
     (lowest, first), (highest, last) = tried[0], tried[-1]
-    ends = [lowest] * (first > 0.0) + edges + [onset or highest] * (last > 0.0)
-    return tuple(zip(ends[::2], ends[1::2], strict=True))
+    if first > 0.0:
+        edges.insert(0, lowest)
+    if last > 0.0:
+        edges.append(highest if onset is None else onset)
+    return tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _at_speed(drive: Drive, speed: float, margin: Callable[[Drive], float]) -> float:

@@ -191,6 +191,16 @@ def test_too_short_a_motion_has_no_cycle_and_no_regime(duration: float) -> None:
     assert measures == Measures(None, None, None, None, None, None, 0, None)
 
 
+def test_no_cycle_spans_an_interruption() -> None:
+    meter = CycleMeter(window=20)
+    whole = vibration(8.0)
+    first = meter.feed(whole[:14], 1.0)
+    meter.interrupt()
+    second = meter.feed(replace(whole, time=whole.time + 1000.0)[16:], 1.0)
+    assert (len(first), len(second)) == (2, 2)
+    assert [cycle.period for cycle in [*first, *second]] == pytest.approx([2.0 * pi] * 4)
+
+
 MOTIONS = {
     "stick-slip": (PAPER, 0.0, 0.0, 60.0),
     "towards equilibrium": (ABOVE_HOPF, 0.0, 0.0, 60.0),

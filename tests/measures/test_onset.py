@@ -153,6 +153,18 @@ def test_errors_that_are_common_to_equal_taps_are_not_averaged_out() -> None:
     assert mean.ring_downs == 10
 
 
+def test_where_no_family_is_likely_the_errors_are_larger_than_told() -> None:
+    """By the errors as told the likeliest one has a probability of 3 %."""
+    speeds = np.linspace(0.06, 0.09, 5)
+    rates = 4.5 * (1.0 - (0.05 / speeds) ** 2) + 0.07 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    scattered = [
+        RingDown(0.0, 1.0, speed, rate, 0.05, 16.0, 1e-3, 1e-5)
+        for speed, rate in zip(speeds.tolist(), rates.tolist(), strict=True)
+    ]
+    families = onset_of(scattered).families.values()
+    assert max(family.probability for family in families) > 0.2
+
+
 @pytest.mark.long
 def test_machines_of_three_laws_are_covered() -> None:
     """A part of the study in benchmarks/onset.py."""

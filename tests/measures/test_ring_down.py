@@ -51,6 +51,13 @@ def test_decay_and_frequency_are_those_of_the_signal(
         assert each.belt_speed == pytest.approx(BELT)
 
 
+def test_a_tap_beside_a_lasting_vibration_is_no_ring_down() -> None:
+    """No decay fits it: a search that does not converge ends."""
+    tap = np.exp(-6.0 * TIME) * np.sin(2.0 * pi * 58.0 * TIME)
+    position = 1e-6 * (tap + np.sin(2.0 * pi * 55.1 * TIME + 1.0))
+    assert found(position[:3000], 0.4 * FEED[:3000]) == []
+
+
 def test_the_decay_is_that_of_small_amplitudes() -> None:
     plain, bent = (found(tapped(2.0, 16.0, 5e-5, effect)) for effect in (0.0, 0.3))
     for each, other in zip(plain, bent, strict=True):

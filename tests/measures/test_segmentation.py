@@ -91,6 +91,16 @@ def test_a_slide_on_a_belt_whose_velocity_is_told_wrong_rests_on_another_guide()
     assert share == pytest.approx(1.0 - SLIP / PERIOD, abs=0.06)
 
 
+def test_an_uneven_belt_or_an_earlier_stick_slip_is_no_other_guide() -> None:
+    random, time = np.random.default_rng(1), 1e-9 * STAMPS
+    feed = TRAVEL / PERIOD
+    lag = feed * time - stairs(time + 0.3) + 1e-6 * random.standard_normal(len(time))
+    uneven = feed * (1.0 + 1e-3 * random.standard_normal(len(time)))
+    assert fed(columns(STAMPS, lag, None, uneven), UNKNOWN).other_guide is None
+    slips = np.where(time < 0.7 * time[-1], lag, 2e-5 * np.sin(30.0 * time))
+    assert fed(columns(STAMPS, slips, belt_velocity=feed), UNKNOWN).other_guide is None
+
+
 def test_a_vibration_on_a_larger_motion_is_no_cycle() -> None:
     time = 1e-9 * STAMPS
     noise = 2e-6 * np.random.default_rng(1).standard_normal(len(time))
@@ -106,7 +116,7 @@ def test_a_motion_that_repeats_nothing_has_no_regime_and_a_reason(tmp_path: Path
     np.savetxt(tmp_path / "turns.csv", np.c_[time, 1e-4 * np.cumsum(velocity)], delimiter=",")
     report = report_of_recording(tmp_path / "turns.csv", {"time": "#1", "position": "#2"})
     assert report["regime"] is None
-    assert any("no three cycles repeat" in note for note in report["notes"])
+    assert any("nor repeats one vibration" in note for note in report["notes"])
 
 
 def test_where_noise_hides_a_rest_at_the_turns_there_is_no_regime() -> None:

@@ -178,6 +178,17 @@ def test_a_bad_force_does_not_bring_the_controller_back(stamp: int, force: float
     assert not loop.answers.controller_present
 
 
+def test_realtime_holds_the_newest_force_and_counts_what_is_late() -> None:
+    loop = Loop(realtime=True)
+    loop.advance()
+    assert (loop.acting, loop.answers.late_forces) == (0.0, 1)
+    loop.answer(1, 0.5)
+    loop.advance()
+    assert (loop.acting, loop.answers.late_forces) == (0.5, 1)
+    loop.advance_by(2)
+    assert (loop.acting, loop.answers.late_forces) == (0.5, 3)
+
+
 def test_realtime_takes_a_late_answer_if_it_is_the_newest() -> None:
     loop = Loop(realtime=True)
     loop.advance_by(5)
