@@ -4,21 +4,26 @@ What the page parses, or runs, is a literal; and so it is in a real browser.
 """
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter
 
 from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.topics import DIAGNOSTICS, JOINT_STATES
-from tests.app.dashboard.test_page import Served, Start, browser  # noqa: F401 - a fixture used here
-from tests.nodes.graph import PATIENCE, Graph, wait_for
+from tests.app.dashboard.test_page import (
+    Served,
+    Start,
+    browser,  # noqa: F401 - a fixture used here
+    new_page,
+)
+from tests.nodes.graph import Graph, wait_for
 
 RUN = "window.ran=1;fetch('http://evil.invalid/')"
 PAYLOADS = [
@@ -54,10 +59,9 @@ PARSED = [
 
 
 @pytest.fixture
-def guarded(browser: Callable[..., Page]) -> Iterator[tuple[Page, list[str]]]:  # noqa: F811
+def guarded(browser: Browser) -> Iterator[tuple[Page, list[str]]]:  # noqa: F811
     """A page, and what it did that it must not: errors, violations, requests to others."""
-    page = browser.new_page(viewport={"width": 1400, "height": 1060})
-    page.set_default_timeout(PATIENCE * 1000.0)
+    page = new_page(browser)
     noted: list[str] = []
     page.on("pageerror", lambda error: noted.append(f"error: {error}"))
     page.on("dialog", lambda dialog: (noted.append("dialog"), dialog.dismiss()))

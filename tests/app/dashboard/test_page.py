@@ -35,10 +35,16 @@ def browser() -> Iterator[Browser]:
         yield browser
 
 
-@pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
+def new_page(browser: Browser) -> Page:
+    """Open an empty page, whose waits are as long as those of nodes."""
     page = browser.new_page(viewport={"width": 1400, "height": 1060})
     page.set_default_timeout(PATIENCE * 1000.0)
+    return page
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    page = new_page(browser)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     yield page
@@ -391,13 +397,13 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     alone = start_stickslip(*command, "--duration", "20", "--bag", "alone")
     assert alone.wait(PATIENCE) == 0
     served = Served(start_stickslip("dashboard"))
-    first = browser.new_page()
+    first = new_page(browser)
     first.goto(served.url)
     # It runs until both pages have seen it: a short run may end before a busy machine shows it.
     watched = start_stickslip(*command, "--duration", "1e5", "--bag", "watched")
     first.wait_for_function("stickslip.motion?.end > 1")
     first.close()
-    second = browser.new_page()
+    second = new_page(browser)
     second.goto(served.url)
     second.wait_for_function("stickslip.motion?.end > 21")
     second.close()
