@@ -72,9 +72,8 @@ class Model(Result):
         columns : mapping, optional
             Columns of a table, as for `read_table`.
         **options
-            How it is read, by the names that `identify` has for this: `start` and `end` of the part
-            to predict, `namespace`, `belt_speed`, and those from `joint` to `pitch` for bags and
-            tables of other machines.
+            How it is read, as for `identify`: `namespace`, `belt_speed`, and the options for bags
+            and tables of other machines; `start` and `end` are those of the part to predict.
 
         Returns
         -------

@@ -118,11 +118,11 @@ class WindowMeter:
         """Add the samples that follow (s, m, m/s); return the cycles that they complete."""
         self.ends = []
         completed: list[Cycle] = []
-        new, last = np.array([time, position, velocity, belt]), 0
-        while last < len(time):
-            first, last = last, min(last + _BATCH - self._run % _BATCH, len(time))
-            self._run += last - first
-            self._add(new[:, first:last])
+        new, end = np.array([time, position, velocity, belt]), 0
+        while end < len(time):
+            start, end = end, min(end + _BATCH - self._run % _BATCH, len(time))
+            self._run += end - start
+            self._add(new[:, start:end])
             if self._run % _LOOK_INTERVAL == 0 or self._run == _FIRST_LOOK:
                 self._look()
             # Always at the same samples: what is found must not depend on the blocks.

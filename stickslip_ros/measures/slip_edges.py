@@ -98,12 +98,13 @@ def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> t
     if len(values) < 3:
         return last + 0.5, hypot(_ROW_ERROR, 0.3)
     half = (len(values) - 1) / 2.0
-    lag, middle, roots = np.arange(-half, half + 1.0), last + 1.0 + half, values ** (1.0 / powers)
+    middle, lag = last + 1.0 + half, np.arange(-half, half + 1.0)
+    roots = values ** (1.0 / powers)
     offset, slope = roots.sum(axis=1) / len(lag), roots @ lag / (lag @ lag)
     fitted = np.maximum(offset[:, np.newaxis] + slope[:, np.newaxis] * lag, 0.0) ** powers
     squares = ((fitted - values) ** 2).sum(axis=1) + (near / 3.0) ** 2
-    rises = slope > 0.0
-    edges = middle - np.divide(offset, slope, out=np.full(len(slope), middle - last), where=rises)
+    back = np.full(len(slope), middle - last)  # where the fit does not rise
+    edges = middle - np.divide(offset, slope, out=back, where=slope > 0.0)
     edges = np.minimum(np.maximum(edges, 0.0), last + 1.0)
     weight = (squares.min() / squares) ** 2
     weight /= weight.sum()

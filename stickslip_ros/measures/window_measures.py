@@ -87,18 +87,18 @@ def measure(
     segmented = rests_and_slips(window, reading)
     if segmented is None or segmented.passes:
         measures, fit = _by_reversals(window, reading, quick=quick)
-        return _no_surer_than_told(window, measures, fit), fit
+        return _undecided_if_doubtful(window, measures, fit), fit
     short = segmented.cycle.stick_fraction < _REFINED_SHARE
     short &= segmented.slip_samples >= _LEAST_SLIP
     if not segmented.rests or (short and not quick):
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
-            return _no_surer_than_told(window, _not_surer(refined, segmented), fit), fit
+            return _undecided_if_doubtful(window, _not_surer(refined, segmented), fit), fit
     measures = segmented_measures(window, segmented)
     return measures if segmented.rests else undecided(measures), None
 
 
-def _no_surer_than_told(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
+def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
     """Return measures without a regime where a rest may be hidden, or may be none.
 
     It may be hidden where the slide passes the speed of the belt, and where it turns on a guide at
@@ -137,7 +137,7 @@ def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | N
 
 
 def _may_segment(window: Window, reading: SampleAssumptions) -> bool:
-    """Return whether rests are those relative to one velocity."""
+    """Return whether rests can be looked for: of enough samples, relative to one velocity."""
     samples = window.samples
     return len(samples) >= FEWEST_SAMPLES and not reading.stick_speed and _even(samples.belt)
 

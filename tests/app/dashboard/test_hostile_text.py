@@ -17,12 +17,7 @@ from rclpy.parameter import Parameter
 from stickslip_ros.nodes.base.endpoints import message_class, qos_profile
 from stickslip_ros.record.codec import pack_joint_state
 from stickslip_ros.record.topics import DIAGNOSTICS, JOINT_STATES
-from tests.app.dashboard.test_page import (
-    Served,
-    Start,
-    browser,  # noqa: F401 - a fixture used here
-    new_page,
-)
+from tests.app.dashboard.test_page import Served, Start, new_page
 from tests.nodes.graph import Graph, wait_for
 
 RUN = "window.ran=1;fetch('http://evil.invalid/')"
@@ -59,7 +54,7 @@ PARSED = [
 
 
 @pytest.fixture
-def guarded(browser: Browser) -> Iterator[tuple[Page, list[str]]]:  # noqa: F811
+def guarded(browser: Browser) -> Iterator[tuple[Page, list[str]]]:
     """A page, and what it did that it must not: errors, violations, requests to others."""
     page = new_page(browser)
     noted: list[str] = []

@@ -18,7 +18,6 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from stickslip_ros.record.reader import Recording
-from tests.app.browser import headless_browser
 from tests.app.conftest import Start
 from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here
 from tests.nodes.graph import PATIENCE, wait_for
@@ -27,12 +26,6 @@ from tests.nodes.processes import Processes
 pytestmark = pytest.mark.long
 
 expect.set_options(timeout=PATIENCE * 1000.0)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with headless_browser() as browser:
-        yield browser
 
 
 def new_page(browser: Browser) -> Page:
