@@ -23,7 +23,7 @@ FEW_SAMPLES, LEAST_SAMPLES = 10.0, 4.0
 """Samples per cycle below which cycles are measured together only, and not at all."""
 FEWEST_SAMPLES = 32
 """Number of samples from which the noise is estimated."""
-PRECISION, ROUNDING = 1e-12, 1e-9
+PRECISION, ROUNDING = 1e-12, 1e-8
 """Noise below this share of the largest values is rounding of the numbers, not of a sensor; the
 rounding of numbers in tables, likewise."""
 NOISE_SHARE = 1e-7

@@ -281,9 +281,9 @@ def _measured(
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     still = [(before.landing, after.release) for before, after in pairwise(used)]
     creep, creep_error = _creep(time, relative, still, noise, step)
-    if creep_error == inf:
-        return None
     unit = abs(belt_velocity) or speed
+    if creep_error > _REST_SHARE * unit:  # what is slow may move as all does
+        return None
     return StickSlip(
         cycle=replace(
             means.cycle,

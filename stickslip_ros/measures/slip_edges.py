@@ -28,6 +28,9 @@ _RELEASE_POWERS = np.array([[2.0], [3.0], [4.0], [6.0]])
 leaves a constant force, one that falls with the speed lets the motion grow slowly."""
 _LANDING_POWERS = np.array([[1.5], [2.0], [2.5]])
 """Powers of the time to a landing with which the distance may fall."""
+_LONG, _MOST_CREEP = 0.4, 0.1
+"""Length of a rest that may creep, in the time from the middle of a rest to that of the next: a
+sine is slow for a third of its period; distance by which it creeps, in slips, at most."""
 _ROW_ERROR = 0.3
 """Least standard error of an edge, in sample periods."""
 _SLIP_ERROR = 0.03
@@ -74,14 +77,31 @@ def edge(
     first, last = ((still.first + still.last) // 2 for still in (rest, other))
     way = 1 if last >= first else -1
     rows = np.arange(first, last + way, way)
-    course, size = position[rows] - rest.level, abs(other.level - rest.level)
+    size = abs(other.level - rest.level)
+    near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
+    long = rest.last - rest.first > _LONG * len(rows)
+    level, creep = _line(position, rest, near, size) if long else (rest.level, 0.0)
+    course = position[rows] - level - creep * (rows - first)
     course *= 1.0 if other.level > rest.level else -1.0
     middle = int(np.argmax(course > size / 2.0))
-    near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
     powers = _RELEASE_POWERS if way > 0 else _LANDING_POWERS
     row, error = _edge(course[: middle + 1], near, size, powers)
     period = abs(float(time[last] - time[first])) / max(abs(last - first), 1)
     return float(np.interp(row, np.arange(len(rows)), time[rows])), error * period
+
+
+def _line(position: FloatArray, rest: Rest, near: float, size: float) -> tuple[float, float]:
+    """Return where a rest is in its middle, m, and its creep, m a row, if it leads away from there.
+
+    `near` is the distance from a rest that is none, and `size` that of the slip, m.
+    """
+    quarter = (rest.last - rest.first) // 4
+    inner = position[rest.first + quarter : rest.last - quarter + 1]
+    lag = np.arange(len(inner)) - (len(inner) - 1) / 2.0
+    creep = float(lag @ inner) / max(float(lag @ lag), 1.0)
+    if 2.0 * near < abs(creep) * (rest.last - rest.first) < _MOST_CREEP * size:
+        return float(inner.mean()), creep
+    return rest.level, 0.0
 
 
 def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> tuple[float, float]:
@@ -96,7 +116,10 @@ def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> t
     beyond = (distance[last + 1 :] > far).nonzero()[0]
     values = distance[last + 1 : last + 2 + int(beyond[0]) if len(beyond) else None]
     if len(values) < 3:
-        return last + 0.5, hypot(_ROW_ERROR, 0.3)
+        # A distance that grows with the square of time is near the rest for this many rows; the
+        # edge is between half of them and none.
+        hidden = max(len(values), 1) / (sqrt(far / near) - 1.0)
+        return last + 0.5 - hidden / 2.0, hypot(_ROW_ERROR, 0.3, hidden / 2.0)
     half = (len(values) - 1) / 2.0
     middle, lag = last + 1.0 + half, np.arange(-half, half + 1.0)
     roots = values ** (1.0 / powers)

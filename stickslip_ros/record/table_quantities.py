@@ -29,6 +29,8 @@ from stickslip_ros.text import must_be_one_of
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
+_FEWEST_CHANGES = 16
+"""Number of changes of a position from which it is known to be held for several rows."""
 
 
 class Quantities(NamedTuple):
@@ -78,6 +80,12 @@ def quantities_of(
     values["time"], notes = even_times(time)
     cells.notes.extend(notes)
     if needed == "position":
+        held = _held(values["position"])
+        if held.step > 1:
+            rows, values = rows[held], {name: value[held] for name, value in values.items()}
+            cells.notes.append(
+                f"the position changes in every {held.step} rows only: those between are left out"
+            )
         return Quantities(values, [*cells.notes, *without_faults(cells, values, rows)])
     at, velocity = values["time"][present], values["velocity"][present]
     moved = np.cumsum(np.append(0.0, (velocity[1:] + velocity[:-1]) / 2.0 * np.diff(at)))
@@ -85,6 +93,18 @@ def quantities_of(
     values["position"][present] = moved
     cells.notes.append("the position is not recorded: it is the integral of the velocity")
     return Quantities(values, cells.notes)
+
+
+def _held(position: FloatArray) -> slice:
+    """Return which rows have a position of their own, as recorded faster than it is updated.
+
+    All changes are a multiple of the same number of rows apart.
+    """
+    changed = np.flatnonzero(np.diff(position) != 0.0) + 1
+    if len(changed) <= _FEWEST_CHANGES:
+        return slice(0, None, 1)
+    held = int(np.gcd.reduce(np.diff(changed)))
+    return slice(int(changed[0]) % held, None, held)
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:

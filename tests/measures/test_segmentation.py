@@ -71,6 +71,29 @@ def test_rests_by_turns_and_stamps_that_are_uneven_change_little(
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
 
 
+@pytest.mark.parametrize("share", [0.005, -0.02])
+def test_a_drift_that_ends_leaves_the_rests(share: float) -> None:
+    """Of this share of the feed at the start: no belt velocity suits all rests."""
+    time = 1e-9 * STAMPS
+    noise = 2e-7 * np.random.default_rng(1).standard_normal(len(time))
+    drift = share * TRAVEL / PERIOD * 3.0 * (1.0 - np.exp(-time / 3.0))
+    found = stick_slip(time, stairs(time) + drift + noise, 0.0, 20, 0.0)
+    assert found is not None
+    assert found.rests
+    assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.03)
+
+
+@pytest.mark.parametrize("samples", [24, 32, 48])
+def test_slips_of_few_samples_under_noise_have_their_errors(samples: int) -> None:
+    """What is hidden in the noise of a slip is part of its duration."""
+    time = PERIOD / samples * 1.01 * np.arange(12 * samples)
+    noise = np.random.default_rng(1).standard_normal(len(time)) * TRAVEL / 12.0
+    found = stick_slip(time, stairs(time) + noise, 0.0, 20, 0.0)
+    assert found is not None
+    error = found.cycle.stick_fraction - (1.0 - SLIP / PERIOD)
+    assert abs(error) < 2.0 * found.errors.stick_fraction < 0.3
+
+
 @pytest.mark.parametrize("start", [150, 250, 400, 600, 650])
 def test_a_capture_of_one_and_a_half_periods_has_no_false_regime(start: int) -> None:
     time = STAMPS[: round(1500.0 * PERIOD)] * 1e-9
