@@ -428,12 +428,7 @@ def test_a_page_of_no_run_and_of_a_node_that_dies_and_returns(
     plant = processes.node("plant", **drive)
     expect(page.get_by_text("plant active")).to_be_visible()
     expect(page.get_by_role("switch", name="washout controller")).to_be_disabled()
-    # A long event is wrapped within its box.
-    event = events(page).get_by_text("no control force arrives: continuing without").first
-    expect(event).to_be_visible()
-    widths = events(page).evaluate("box => [box.scrollWidth, box.clientWidth]")
-    assert widths[0] <= widths[1]
-    assert event.evaluate("line => line.getBoundingClientRect().height") > 25.0
+    expect(events(page).get_by_text("no control force arrives").first).to_be_visible()
     plant.kill()
     expect(page.get_by_text("plant silent").first).to_be_visible()
     processes.node("plant", **drive, expects_control=False)
@@ -442,69 +437,6 @@ def test_a_page_of_no_run_and_of_a_node_that_dies_and_returns(
     page.wait_for_function("before => stickslip.motion.end !== before", arg=before)
     assert served.end() == 130
     assert "Traceback" not in "".join(served.said)
-
-
-OVERLAPS = """
-() => stickslip.charts.flatMap((name) => {
-  const { chart } = window.getElement(stickslip[name]);
-  const words = chart.getZr().storage.getDisplayList()
-    .filter((part) => !part.ignore && (part.__title || part.type === "tspan" && part.style.text))
-    .map((part) => {
-      const box = part.getBoundingRect().clone();
-      if (part.transform) box.applyTransform(part.transform);
-      return { text: part.__title ? `tool ${part.__title}` : part.style.text, box };
-    })
-    .filter(({ box }) => box.width > 1);
-  const outside = words.filter(({ box }) => box.x < 0 || box.x + box.width > chart.getWidth());
-  const pairs = words.flatMap((one, place) => words.slice(place + 1)
-    .filter((other) => one.box.intersect(other.box))
-    .map((other) => `${name}: ${one.text} | ${other.text}`));
-  return [...pairs, ...outside.map(({ text }) => `${text} is cut off`)];
-})
-"""
-"""Texts, and tools of the toolbox, that overlap in a chart."""
-
-LAID_OUT = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-
-RESIZED = """
-() => window.stickslip?.charts.every((name) => {
-  const chart = window.getElement?.(stickslip[name])?.chart;
-  return chart && chart.getWidth() === chart.getDom().clientWidth;
-})
-"""
-
-ENOUGH = "() => window.getElement(stickslip.cycles).chart.getOption().series[0].data?.length > 9"
-
-MACHINE = {"mass": 100.0, "stiffness": 1e6, "normal_force": 1000.0, "friction__minimum_speed": 0.05}
-
-
-@pytest.mark.parametrize(
-    "drive",
-    [
-        MACHINE | {"damping": 200.0, "belt_speed": 0.04, "rate": 500.0},
-        {"damping": 0.02, "belt_speed": 0.2, "rate": 20.0, "real_time_factor": 20.0},
-    ],
-    ids=["SI", "dimensionless"],
-)
-def test_no_words_in_the_charts_overlap_in_a_narrow_window(
-    start_stickslip: Start,
-    page: Page,
-    processes: Processes,  # noqa: F811
-    drive: dict[str, object],
-) -> None:
-    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
-    page.goto(served.url)
-    processes.node("analyzer")
-    processes.node("plant", pace="realtime", expects_control="false", **drive)
-    page.wait_for_function(ENOUGH)
-    for width in (390, *range(800, 1601, 200)):
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_function("width => window.innerWidth === width", arg=width)
-        # A page that was not answered for seconds, on a busy machine, loads itself again.
-        page.wait_for_function(LAID_OUT)
-        page.wait_for_function(RESIZED)
-        assert page.evaluate(OVERLAPS) == [], width
-    assert served.end() == 130
 
 
 def test_only_pages_of_this_machine_by_its_own_names_are_answered(
