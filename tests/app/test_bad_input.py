@@ -94,6 +94,7 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "bag --stick-speed -1": "is not a speed in m/s, 0 or more",
         "bag --slips 1e-4 --slip-time 0": "within = 0.0 is invalid: must be above 0 (s)",
         "log.csv --columns time=time,time=t": "each quantity once",
+        "log.csv --force-constant 0.35Nm/A": "--force-constant 0.35Nm/A: is for the current in a",
         "a b c d e f g --plot out.png": "draws at most 6 bags, and 7 were given",
         "bag --plot out.gif": "must end in one of .png",
         "bag --plot pipe.png": "--plot pipe.png: cannot be written",  # nobody reads it

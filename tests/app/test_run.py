@@ -141,13 +141,6 @@ def test_parameters_of_running_nodes_are_set_or_refused(
     assert 0.3 in speeds
 
 
-@pytest.mark.process  # looks for a while
-def test_without_a_node_it_says_how_to_start_one(stickslip: Run) -> None:
-    done = stickslip("set", "plant.belt_speed=0.2")
-    assert (done.returncode, done.stdout) == (1, "")
-    assert "no node /feed_drive/plant is running: `stickslip run` starts the nodes" in done.stderr
-
-
 def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
     start_stickslip: Start, graph: Graph, tmp_path: Path
 ) -> None:

@@ -21,18 +21,6 @@ def test_a_figure_is_of_the_motion_that_is_measured(stickslip: Run, tmp_path: Pa
     assert "Simulated run" not in figure
 
 
-@pytest.mark.long
-def test_a_figure_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> None:
-    disturbed = ("-p", "plant.disturbance.kind=step", "-p", "plant.disturbance.amplitude=0.1")
-    late = ("-p", "plant.force_delay=0.015", "--duration", "100")
-    done = stickslip("simulate", "paper", *disturbed, *late, "--plot", "run.svg")
-    assert done.returncode == 0, done.stderr
-    figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
-    assert "control force and disturbance<" in figure
-    assert "Simulated run" in figure
-    assert "control switched on" not in figure
-
-
 def rows_of(path: Path) -> list[dict[str, float]]:
     with path.open(encoding="utf-8", newline="") as stream:
         return [

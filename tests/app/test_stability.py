@@ -81,20 +81,3 @@ def test_what_is_left_out_is_said_where_it_matters() -> None:
     assert notes["closed_loop"].startswith("sensor and actuator are omitted")
     _, notes = theory_of(load_scenario("paper", [jitter, "plant.expects_control=false"]))
     assert notes["sampled_loop"] == "the scenario has no controller"
-
-
-@pytest.mark.long
-def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")
-    law = [text for override in overrides for text in ("-p", override)]
-    theory = theory_of(load_scenario("paper", overrides))
-    monkeypatch.setattr("stickslip_ros.studies.stability.stability", lambda *_: theory)
-    found = stickslip.json("stability", "paper", *law)
-    assert found["open_loop"]["stable"] is True
-    unstable, stable = found["open_loop"]["limit_cycles"]
-    assert (unstable["stable"], unstable["regime"]) == (False, "pure_slip")
-    assert (stable["stable"], stable["regime"]) == (True, "stick_slip")
-    assert unstable["amplitude"] < stable["amplitude"]
-    done = stickslip("stability", "paper", *law)
-    assert "1, unstable" in done.stdout
-    assert "2, stable" in done.stdout
