@@ -1,28 +1,25 @@
 """`stickslip sweep` and `basin`: tables, figures, the time they take, and interruptions."""
 
-import signal
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from stickslip_ros.app import output, study_command
+from stickslip_ros.app import output
 from stickslip_ros.studies import runner
 from stickslip_ros.studies import study as study_module
 from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, Study
-from tests.app.conftest import Run, Start, ended
-from tests.nodes.graph import wait_for
-
-FREE = ("sweep", "paper", "--no-control", "--transient", "100")
-SPEEDS = ("--over", "plant.belt_speed=0.2:0.6:5")
+from tests.app.conftest import Run
 
 
 def test_a_table_that_came_meanwhile_is_left_alone_and_the_points_are_kept(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table, whole = tmp_path / "table.csv", runner.run_here
+    speeds = ("--over", "plant.belt_speed=0.2:0.6:3")
+    sweep = ("sweep", "paper", "--no-control", *speeds, "--out", "table.csv")
 
     def run_here(*arguments: Any) -> None:
         whole(*arguments)
@@ -30,52 +27,14 @@ def test_a_table_that_came_meanwhile_is_left_alone_and_the_points_are_kept(
 
     with monkeypatch.context() as patch:
         patch.setattr(runner, "run_here", run_here)
-        done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
+        done = stickslip(*sweep)
     assert done.returncode == 2
     assert "--out table.csv: cannot be written: File exists" in done.stderr
     assert table.read_text() == "mine"
     table.unlink()
     begun = (tmp_path / "table.csv.part").read_bytes()
     assert begun.count(b"\n") > 1
-    assert stickslip(*FREE, *SPEEDS, "--out", "table.csv").returncode == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
-
-
-def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
-    start_stickslip: Start, stickslip: Run, tmp_path: Path
-) -> None:
-    speeds = ("--over", "plant.belt_speed=0.1:0.5:200")
-    process = start_stickslip(*FREE, *speeds, "--workers", "1", "--out", "table.csv")
-    part = tmp_path / "table.csv.part"
-    wait_for(
-        lambda: process.poll() or (part.exists() and part.read_bytes().count(b"\n") > 1), "points"
-    )
-    _, messages = ended(process, 130, signal.SIGINT)
-    assert "of 200 points are done; they stay in table.csv.part" in messages
-    assert "Traceback" not in messages
-    assert not (tmp_path / "table.csv").exists()
-    kept = part.read_bytes()
-    done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
-    assert done.returncode == 2
-    assert "belongs to another study, which differs in plan.axes" in done.stderr
-    assert part.read_bytes() == kept
-    for name in ("table.csv", "whole.csv"):
-        done = stickslip(*FREE, *speeds, "--out", name)
-        assert done.returncode == 0, done.stderr
-    assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
-    assert not part.exists()
-
-
-def test_interrupted_after_its_table_is_written_it_leaves_no_journal(
-    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def print_result(*_: object) -> None:
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr(study_command, "print_result", print_result)
-    done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
-    assert done.returncode == 130
-    assert done.stderr == "stickslip sweep: interrupted: table.csv is there\n"
+    assert stickslip(*sweep).returncode == 0
     assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
 
 
