@@ -16,7 +16,6 @@ from tests.app.conftest import Run
 from tests.record.runs import STAMPS, record
 
 TWO = "has sections for the controllers washout_controller and velocity_feedback_controller: name "
-FREE = "needs a spring: the drive has stiffness = 0 N/m"
 PLACE = "exists already; it is not overwritten"
 COLUMNS = "time=t,position=x,force=u"
 LOG = f"log.csv --columns {COLUMNS}"
@@ -54,17 +53,14 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
             "--continuous-control ... plant.force_delay ... 0.1"
         ),
         f"{LAW}lugre -p plant.friction.curve=dahl": "'dahl' is invalid: law dahl has a memory",
-        f"{LAW}lugre -p plant.friction.curve=stiction": "'stiction' is invalid: law stiction has",
         f"{LAW}lugre -p plant.friction.curve=linear": "must be at least 1e-12 at every speed",
         f"{LAW}dahl -p plant.friction.static=0": "must be at least 1e-12 for law dahl",
     },
     "run": {
         "./nosuch.yaml": "no scenario file ./nosuch.yaml",
-        "two.yaml --duration 1": TWO,
         "paper --namespace 'a b'": "--namespace 'a b'",
         f"paper --namespace {230 * 'n'}": "has 231 characters, and must have at most 200",
         "paper --bag .": "exists already",
-        "feed_drive -p plant.belt_speed=30": FAST,
         "paper --controller stickslip/x": "no package stickslip ... mean stickslip_ros?",
         "paper --controller nosuch/x": "no package nosuch in ... AMENT_PREFIX_PATH",
         "paper --controller stickslip_ros/damper": "no executable damper ... plant_node, ",
@@ -112,10 +108,8 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "--topics /x bag": "BAG",
     },
     "sweep": {
-        "two.yaml --over plant.belt_speed=0.2:0.3:2": TWO,
         "paper --over belt_speed=1:2:3": "belt_speed: must be a parameter of plant or washout",
         "feed_drive --over plant.belt_speed=2:30:20": FAST,
-        "feed_drive --over plant.damping=0:30:20 --over plant.belt_speed=-30:2:20": FAST,
         f"{SPEEDS} --colour amplitude": "is for maps, of two parameters",
         f"{SPEEDS} --out table.txt": "--out table.txt: must end in one of .csv, .json",
         f"{SPEEDS} --out there.csv": f"--out there.csv: {PLACE}",
@@ -129,15 +123,11 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
     },
     "basin": {
         "axis": "without a spring no range of starts follows from the drive",
-        "two.yaml --sample 2 --position=0:1 --velocity=0:1": TWO,
-        "feed_drive -p plant.belt_speed=30": FAST,
         "paper --seed 1": "--seed 1: is for a random --sample",
         "paper --plot basin.txt": "--plot basin.txt: must end in one of",
     },
     "stability": {
-        "axis": FREE,
-        "two.yaml": TWO,
-        "feed_drive -p plant.belt_speed=30": FAST,
+        "axis": "needs a spring: the drive has stiffness = 0 N/m",
         "paper --plot map.txt": "--plot map.txt ... .png",
         "paper --plot map.png -p plant.belt_speed=0.0": "map.png ... the belt rests",
         "paper --plot map.png --no-control -p plant.friction.reverse.static=0.5": (
@@ -146,7 +136,6 @@ REFUSED: Mapping[str, Mapping[str, str]] = {
         "paper --plot /proc/map.png": "/proc/map.png ... cannot be written",
     },
     "design": {
-        f"{LOOSE} --belt-speed 0.02:0.04": FREE,
         "feed_drive --belt-speed 2:30": FAST,
         "feed_drive --belt-speed slow": "--belt-speed = 'slow' ... a number in m/s",
         "feed_drive --belt-speed 1:2:3": "--belt-speed '1:2:3' ... LOW:HIGH",
@@ -243,17 +232,15 @@ def test_a_fast_belt_that_is_meant_is_taken(stickslip: Run) -> None:
         assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("command", ["run paper", "replay bag"])
 def test_an_impossible_domain_is_refused(
-    stickslip: Run, process_environment: dict[str, str], command: str
+    stickslip: Run, process_environment: dict[str, str]
 ) -> None:
     for given, shown in (("here", "'here'"), ("-1", "'-1'"), ("010", "'010'"), ("233", "233")):
         process_environment["ROS_DOMAIN_ID"] = given
-        done = stickslip(*command.split())
+        done = stickslip("run", "paper")
         assert done.returncode == 2
         refusal = f"ROS_DOMAIN_ID = {shown} is invalid: must be an integer from 0 to 232"
         assert refusal in done.stderr.splitlines()[-1]
-        assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize(
