@@ -232,12 +232,13 @@ def test_a_fast_belt_that_is_meant_is_taken(stickslip: Run) -> None:
         assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize("command", ["run paper", "replay bag"])
 def test_an_impossible_domain_is_refused(
-    stickslip: Run, process_environment: dict[str, str]
+    stickslip: Run, process_environment: dict[str, str], command: str
 ) -> None:
     for given, shown in (("here", "'here'"), ("-1", "'-1'"), ("010", "'010'"), ("233", "233")):
         process_environment["ROS_DOMAIN_ID"] = given
-        done = stickslip("run", "paper")
+        done = stickslip(*command.split())
         assert done.returncode == 2
         refusal = f"ROS_DOMAIN_ID = {shown} is invalid: must be an integer from 0 to 232"
         assert refusal in done.stderr.splitlines()[-1]
