@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import pairwise
 from math import cos, sin
 from pathlib import Path
-from unittest import mock
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -452,12 +451,3 @@ def test_the_text_has_what_is_known(
     assert live.text() == f"{name}: amplitude 1 mm, frequency 2 Hz, {end}"
     live.assume_plant(dict.fromkeys(("mass", "stiffness", "normal_force"), 1.0))
     assert live.text() == f"{name}: amplitude 0.001, frequency 2, {end}"
-
-
-@pytest.mark.parametrize(("normal_force", "unit"), [(1.0, ""), (2.0, "m")])
-def test_the_report_of_a_dimensionless_drive_has_no_units(normal_force: float, unit: str) -> None:
-    live = LiveMeasures(AnalyzerParameters(), DroppedMessages.__new__(DroppedMessages))
-    live.assume_plant({"mass": 1.0, "stiffness": 1.0, "normal_force": normal_force})
-    with mock.patch.object(live.meter.motion, "measured", wraps=live.meter.motion.measured) as call:
-        live.report()
-    assert call.call_args.args == (unit,)
