@@ -7,12 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from stickslip_ros.record.reader import Recording
-from stickslip_ros.record.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES
 from tests.app.conftest import Run, Start, ended
 from tests.nodes.graph import PATIENCE, Graph, states_of, wait_for
 from tests.nodes.processes import wait_for_samples
@@ -23,13 +22,13 @@ from tests.nodes.runs import FORCES, STATES, messages_of, record_states
 def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     start_stickslip: Start, graph: Graph, tmp_path: Path
 ) -> None:
-    health = graph.listen(DIAGNOSTICS)
+    health = graph.health("/feed_drive/plant")
     in_real_time = ("--pace", "realtime", "--duration", "10")
     process = start_stickslip("run", "paper", *in_real_time, "--bag", "bag", "--json")
     wait_for_samples(process, tmp_path / "bag")
     (analyzer,) = (child for child in children(process.pid) if b"nodes.analyzer" in command(child))
     os.kill(analyzer, signal.SIGSTOP)
-    graph.wait_until(lambda: states_of_plant(health)[-3:] == 3 * ["inactive"], "the plant pauses")
+    graph.wait_until(lambda: states_of(health)[-3:] == 3 * ["inactive"], "the plant pauses")
     os.kill(analyzer, signal.SIGCONT)
     output, _ = ended(process, 0)
     result = json.loads(output)
@@ -37,31 +36,26 @@ def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
 
 
 def test_a_plant_that_is_deactivated_pauses_the_run(start_stickslip: Start, graph: Graph) -> None:
-    health = graph.listen(DIAGNOSTICS)
+    health = graph.health("/feed_drive/plant")
 
     def ask_for(transition: int) -> None:
         request = ChangeState.Request(transition=Transition(id=transition))
         assert graph.call(ChangeState, "/feed_drive/plant/change_state", request).success
 
     process = start_stickslip("run", "paper", "--pace", "realtime", "--composed", "--json")
-    graph.wait_until(lambda: "active" in states_of_plant(health), "the plant is active")
+    graph.wait_until(lambda: "active" in states_of(health), "the plant is active")
     ask_for(Transition.TRANSITION_DEACTIVATE)
-    told = len(states_of_plant(health))
-    graph.wait_until(lambda: len(states_of_plant(health)) > told + 2, "it stays paused")
-    assert states_of_plant(health)[-1] == "inactive"
+    told = len(states_of(health))
+    graph.wait_until(lambda: len(states_of(health)) > told + 2, "it stays paused")
+    assert states_of(health)[-1] == "inactive"
     assert process.poll() is None
     ask_for(Transition.TRANSITION_ACTIVATE)
-    graph.wait_until(lambda: states_of_plant(health)[-1] == "active", "it goes on")
+    graph.wait_until(lambda: states_of(health)[-1] == "active", "it goes on")
     output, errors = ended(process, 130, signal.SIGINT)
     for told in ("the plant is paused", "the plant continues"):
         assert errors.count(told) == 1
     result = json.loads(output)
     assert (result["report"]["complete"], result["lost_samples"]) == (True, 0)
-
-
-def states_of_plant(health: list[DiagnosticArray]) -> list[str]:
-    """Return in which states of its life cycle the plant has said to be, the newest last."""
-    return states_of([s for array in health for s in array.status if s.name == "/feed_drive/plant"])
 
 
 def test_no_node_outlives_a_run_that_is_killed(

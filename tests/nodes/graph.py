@@ -120,11 +120,12 @@ class Graph:
         return heard
 
     def health(self, node: str) -> list[DiagnosticStatus]:
-        """Return a list to which every status will be appended that a node reports."""
+        """Return a list to which every status of a node, in /test or by full name, will be appended."""
+        name = node if node.startswith("/") else f"/test/{node}"
         heard: list[DiagnosticStatus] = []
 
         def take(array: Any) -> None:
-            heard.extend(status for status in array.status if status.name == f"/test/{node}")
+            heard.extend(status for status in array.status if status.name == name)
 
         self.subscribe(DIAGNOSTICS, take, raw=False)
         return heard

@@ -192,9 +192,8 @@ def test_it_says_that_a_joint_must_be_chosen(graph: Graph) -> None:
 def test_it_keeps_the_counts_of_late_forces_of_each_activation_of_the_plant(
     graph: Graph, tmp_path: Path
 ) -> None:
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    analyzer = graph.add_active(AnalyzerNode, bag=str(tmp_path / "bag"))
     plant = graph.publisher(DIAGNOSTICS, 1)
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
 
     def tell(name: str, state: str, first_stamp: int, *counts: int) -> None:
         keys = "state", "first_stamp", "samples", "late_forces", "missed_deadlines"
@@ -263,9 +262,7 @@ def test_no_sample_counts_as_recorded_before_the_parameters_are(
     graph.subscribe(RECORDED, note)
     graph.add(PlantNode, autostart=False)
     states = graph.publisher(JOINT_STATES)
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), autostart=False)
-    analyzer.trigger_configure()
-    analyzer.trigger_activate()
+    analyzer = graph.add_active(AnalyzerNode, bag=str(tmp_path / "bag"))
     graph.wait_until(lambda: states.get_subscription_count() > 0, "analyzer listens")
     states.publish(pack_joint_state(1_000_000_000, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0)))
     graph.wait_until(lambda: answered, "the sample is recorded")
@@ -273,9 +270,7 @@ def test_no_sample_counts_as_recorded_before_the_parameters_are(
 
 
 def test_a_timer_that_is_due_when_it_stops_does_nothing(graph: Graph) -> None:
-    analyzer = graph.add(AnalyzerNode, autostart=False)
-    analyzer.trigger_configure()
-    analyzer.trigger_activate()
+    analyzer = graph.add_active(AnalyzerNode)
     due = [timer.callback for timer in analyzer._activation._periodic]
     assert len(due) == 2
     analyzer.trigger_deactivate()
@@ -313,9 +308,8 @@ def test_restarted_it_records_beside_the_bag_that_was_left(graph: Graph, tmp_pat
 def test_a_message_without_a_proper_stamp_does_not_end_the_recording(
     graph: Graph, tmp_path: Path
 ) -> None:
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    graph.add_active(AnalyzerNode, bag=str(tmp_path / "bag"))
     force = graph.publisher(CONTROL_FORCE, 1)
-    graph.wait_until(lambda: analyzer.active, "analyzer listens")
     for stamp in (-1_000_000_000, 0, 5_000_000_000, 3_000_000_000):
         force.publish(pack_wrench(stamp, 1.0))
     graph.deactivate("analyzer")
@@ -356,9 +350,8 @@ def test_a_controller_that_the_middleware_names_late_is_asked_for_its_parameters
 def test_what_has_arrived_when_it_stops_is_recorded_although_nothing_has_run(
     graph: Graph, tmp_path: Path
 ) -> None:
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    analyzer = graph.add_active(AnalyzerNode, bag=str(tmp_path / "bag"))
     states = graph.publisher(JOINT_STATES, 1)
-    graph.wait_until(lambda: analyzer.active, "analyzer listens")
     stamps = [1_000_000_000 + n * 1_000_000 for n in range(500)]
     for stamp in stamps:
         states.publish(pack_joint_state(stamp, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0)))

@@ -10,7 +10,6 @@ from math import inf, isfinite, nan
 from pathlib import Path
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
@@ -31,7 +30,6 @@ from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.record.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
-    DIAGNOSTICS,
     DISTURBANCE_FORCE,
     JOINT_STATES,
     RECORDED,
@@ -149,12 +147,11 @@ def test_a_second_plant_is_named_while_it_is_there(graph: Graph, tmp_path: Path)
 
 
 def test_the_controller_never_sends_what_is_not_finite(graph: Graph) -> None:
-    controller = graph.add(
+    forces = graph.listen(CONTROL_FORCE, raw=True)
+    controller = graph.add_active(
         WashoutControllerNode, wait_for=["observer"], corner_frequency=1e3, cubic_gain=-1e30
     )
-    forces = graph.listen(CONTROL_FORCE, raw=True)
     states = graph.publisher(JOINT_STATES, 1)
-    graph.wait_until(lambda: controller.active, "the controller listens")
 
     def send(number: int, velocity: float) -> None:
         states.publish(pack_joint_state(number * SECOND, (0.0, 0.0), (velocity, 0.4), (0.0, 0.0)))
@@ -172,9 +169,8 @@ def test_the_controller_never_sends_what_is_not_finite(graph: Graph) -> None:
 
 def test_a_stamp_beyond_ros_time_is_dropped(graph: Graph, tmp_path: Path) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
-    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    controller = graph.add_active(WashoutControllerNode, wait_for=["analyzer"])
     states = graph.publisher(JOINT_STATES, 2)
-    graph.wait_until(lambda: analyzer.active and controller.active, "both listen")
     late = JointState(name=["slide", "belt"], position=[0.0, 0.0], velocity=[0.1, 0.4])
     late.header.stamp.sec, late.header.stamp.nanosec = 2**31 - 1, 2**32 - 1
     states.publish(late)
@@ -230,14 +226,9 @@ def test_a_flood_of_garbage_leaves_no_trace_but_a_count(
         "washout_controller": processes.node("washout_controller", force_limit=1.0),
         "plant": processes.node("plant", pace="realtime"),
     }
-    health: dict[str, DiagnosticStatus] = {}
-
-    def hear(message: DiagnosticArray) -> None:
-        health.update({status.name.rpartition("/")[2]: status for status in message.status})
-
-    graph.observer.create_subscription(DiagnosticArray, DIAGNOSTICS.name, hear, 100)
+    health = [graph.health(name) for name in started]
     heard = graph.listen(JOINT_STATES, raw=True)
-    graph.wait_until(lambda: len(heard) > 100 and health.keys() >= started.keys(), "they run")
+    graph.wait_until(lambda: len(heard) > 100 and all(health), "they run")
     strangers = [graph.publisher(topic, 1) for topic in TOPICS]
     newest = unpack_header(heard[-1])
     sent = messages(23, lambda: newest)
@@ -258,12 +249,10 @@ def test_a_flood_of_garbage_leaves_no_trace_but_a_count(
         graph.observer.destroy_publisher(stranger)
     for name in started:
         assert sizes[-1][name] - sizes[0][name] < 20_000_000, name
-    health.clear()
+    for told in health:
+        told.clear()
     graph.wait_until(
-        lambda: (
-            health.keys() >= started.keys()
-            and not any("messages dropped" in s.message for s in health.values())
-        ),
+        lambda: all(told and "messages dropped" not in told[-1].message for told in health),
         "nobody complains any more",
     )
     heard.clear()

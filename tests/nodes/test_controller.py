@@ -66,9 +66,8 @@ class Loop:
         self.graph = graph
         self.forces = graph.listen(CONTROL_FORCE, raw=True)
         self.references = graph.listen(REFERENCE, raw=True)
-        self.controller = graph.add(node, **parameters)
+        self.controller = graph.add_active(node, **parameters)
         self.states, self.given = graph.publisher(JOINT_STATES, 1), graph.publisher(REFERENCE)
-        graph.wait_until(lambda: self.controller.active, "controller listens")
 
     def force(self, stamp: int, position: float = 0.0, velocity: float = 0.0) -> float:
         """Send a state and return the force of the answer."""

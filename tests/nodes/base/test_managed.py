@@ -52,9 +52,8 @@ def test_messages_come_decoded_and_unless_asked_for_only_while_active(graph: Gra
 
 def test_what_cannot_be_decoded_is_told_until_the_next_activation(graph: Graph) -> None:
     told: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
-    node = graph.add(Listener)
+    node = graph.add_active(Listener)
     publisher = graph.publisher(RECORDED, 2)
-    graph.wait_until(lambda: node.active, "active")
     publisher.publish(b"\0\1\0\0")
     graph.wait_until(lambda: node.diagnose()[0] == WARN, "dropped")
     node.publish_diagnostics()
