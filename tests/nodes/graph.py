@@ -120,7 +120,7 @@ class Graph:
         return heard
 
     def health(self, node: str) -> list[DiagnosticStatus]:
-        """Return a list to which every status of a node, in /test or by full name, will be appended."""
+        """Return a list that gets every status of a node: of one in /test, or of a full name."""
         name = node if node.startswith("/") else f"/test/{node}"
         heard: list[DiagnosticStatus] = []
 
