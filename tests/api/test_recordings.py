@@ -133,13 +133,6 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> ss.Model:
     return ss.identify(path, law="stribeck", fixed=known)
 
 
-def test_the_constants_of_exact_samples(model: ss.Model) -> None:
-    assert model.law == "stribeck"
-    assert model.parameters["plant.stiffness"].value == pytest.approx(1e6, rel=1e-6)
-    assert model.parameters["plant.friction.static"].value == pytest.approx(0.4, rel=1e-5)
-    assert "plant.bias_force" in model.unidentified
-
-
 def test_the_scenario_of_a_model(model: ss.Model, tmp_path: Path) -> None:
     saved = model.save(tmp_path / "drive.yaml")
     assert saved.plant.stiffness == pytest.approx(1e6, rel=1e-6)

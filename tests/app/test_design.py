@@ -37,10 +37,6 @@ def test_the_parameter_file_quenches_the_vibration(
     assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
     for name in ("corner_frequency", "linear_gain", "cubic_gain", "force_limit", "start_after"):
         assert f'"{name}": {found[name]}' in found["parameter_file"]
-    assert found["belt_speeds"] == pytest.approx([0.04, 0.04])
-    for name in ("settling_time", "peak_force"):
-        for figure in (name, f"predicted_{name}"):
-            assert found[figure] == max(check[figure] for check in found["checks"])
     assert found["peak_force"] <= found["force_limit"] == 200.0
     assert found["scenario"]["name"] == "feed_drive"
     gains = [

@@ -1,6 +1,5 @@
 """`stickslip identify`: from a log to a model, a scenario and a figure."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ from PIL import Image
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification import scenario
 from tests.app.conftest import Run
 from tests.identification.axis_record import record
 from tests.record.runs import full_disk
@@ -58,7 +56,7 @@ def test_a_log_becomes_a_model_a_scenario_and_a_figure(
 
 @pytest.mark.long
 def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
-    """With gaps, in parts, and with a column that the log lacks; as JSON and as tables."""
+    """With gaps, in parts, and with a column that the log lacks."""
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
     often, late = rows.copy(), rows.copy()
     often[::7, 3] = np.nan
@@ -78,15 +76,7 @@ def test_recordings_that_are_checked(stickslip: Run, log: Path) -> None:
     assert any("the reference of often.csv has no 500 samples" in note for note in found["notes"])
     assert found["checks"][1]["position_error"] == pytest.approx(found["position_error"], rel=0.1)
     assert found["checks"][-1]["force_error"] > 0.0
-    done = stickslip("identify", "axis.csv", *given, *checks)
-    (mass,) = re.findall(r"plant\.mass +(\S+) kg +(\S+) kg ", done.stdout)
-    assert len(mass[0].partition(".")[2]) >= 2
-    assert float(mass[1]) < 1.0
-    shown = "law coulomb", "95 % interval", "chosen", "is not identifiable", "simulation error"
-    for words in shown:
-        assert words in done.stdout
-    assert "nan" not in done.stdout.replace("plant.", "")
-    assert "late.csv has no" not in done.stdout
+    assert not any("late.csv has no" in note for note in found["notes"])
 
 
 @pytest.mark.long
@@ -101,40 +91,20 @@ def test_a_memory_in_both_directions_becomes_a_scenario(stickslip: Run, log: Pat
 
 
 @pytest.mark.long
-def test_a_model_in_python_is_saved_and_checked(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, log: Path
-) -> None:
-    """What cannot be written leaves no files; of a recording in parts one must be chosen."""
+def test_a_model_in_python_is_saved_and_checked(tmp_path: Path, log: Path) -> None:
+    """Of a recording in parts one must be chosen; on a full disk no file of a model is left."""
     model = ss.identify(log, columns=_BY_NAME, law="table")
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
     parts = written(tmp_path / "parts.csv", np.delete(rows, range(2000, 2100), 0))
     with pytest.raises(InvalidInputError, match="has 2 parts between long gaps"):
         model.check(parts, _BY_NAME)
     assert model.check(parts, _BY_NAME, start=2.05)["force_error"] > 0.0
-
-    def refused(*_: object) -> None:
-        raise InvalidInputError("it is refused")
-
-    monkeypatch.setattr(scenario, "commented_file", refused)
     before = {*tmp_path.iterdir()}
-    with pytest.raises(InvalidInputError, match="it is refused"):
-        model.save(tmp_path / "found.yaml")
-    assert {*tmp_path.iterdir()} == before
-    monkeypatch.undo()
     # There is room for the curves, but not for the scenario.
     with full_disk(4096), pytest.raises(OSError, match="File too large"):
         model.save(tmp_path / "found.yaml")
     assert {*tmp_path.iterdir()} == before
     model.save(tmp_path / "found.yaml")
-
-
-@pytest.mark.long
-def test_laws_that_predict_worse_say_by_how_much(stickslip: Run, log: Path) -> None:
-    done = stickslip("identify", "axis.csv", "--columns", _COLUMNS)
-    assert done.returncode == 0, done.stderr
-    assert re.search(r"coulomb .* predicts worse, by \d+\.\d standard errors", done.stdout)
-    assert "table and table" not in done.stdout
-    assert "exponential and table predict" not in done.stdout
 
 
 def test_a_map_gives_friction_alone(stickslip: Run, tmp_path: Path) -> None:

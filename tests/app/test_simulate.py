@@ -12,15 +12,6 @@ from stickslip_ros.quantities import quantities_of
 from tests.app.conftest import Run
 
 
-def test_a_figure_is_of_the_motion_that_is_measured(stickslip: Run, tmp_path: Path) -> None:
-    call = ("simulate", "paper", "--no-control", "--duration", "100")
-    assert stickslip.json(*call, "--plot", "run.svg", "--no-title") == stickslip.json(*call)
-    figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
-    for text in ("phase portrait", "control force<", "each cycle"):
-        assert text in figure
-    assert "Simulated run" not in figure
-
-
 def rows_of(path: Path) -> list[dict[str, float]]:
     with path.open(encoding="utf-8", newline="") as stream:
         return [

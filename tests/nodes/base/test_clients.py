@@ -30,15 +30,6 @@ def client(domain: int) -> Iterator[LifecycleClient]:
         yield LifecycleClient(spinner, asking, "washout_controller", PATIENCE)
 
 
-def test_each_transition_is_made_once(client: LifecycleClient) -> None:
-    assert client.state() == "unconfigured"
-    assert not client.change_state(ACTIVATE)
-    assert client.change_state(CONFIGURE)
-    assert client.state() == "inactive"
-    assert client.change_state(ACTIVATE)
-    assert client.state() == "active"
-
-
 def test_the_state_replaces_an_answer_that_is_lost(
     client: LifecycleClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
