@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -107,7 +106,6 @@ def test_bad_parameters_end_the_process_with_one_line(
         assert text in lines[0]
 
 
-@pytest.mark.process
 @pytest.mark.parametrize(
     ("command", "imported"),
     [
@@ -117,7 +115,11 @@ def test_bad_parameters_end_the_process_with_one_line(
     ],
 )
 def test_what_still_imports_ends_quietly(
-    process_environment: dict[str, str], tmp_path: Path, command: list[str], imported: str
+    processes: Processes,
+    process_environment: dict[str, str],
+    tmp_path: Path,
+    command: list[str],
+    imported: str,
 ) -> None:
     slow = "import signal; print('importing', flush=True); signal.pause()"
     (tmp_path / f"{imported}.py").write_text(slow, encoding="utf-8")
@@ -125,17 +127,11 @@ def test_what_still_imports_ends_quietly(
     (tmp_path / "plant_node").write_text(script, encoding="utf-8")
     path = [str(tmp_path), *filter(None, [process_environment.get("PYTHONPATH")])]
     process_environment["PYTHONPATH"] = os.pathsep.join(path)
-    with subprocess.Popen(
-        [sys.executable, *command],
-        cwd=tmp_path,
-        env=process_environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout.readline() == "importing\n"
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=PATIENCE)
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = processes.start(command, cwd=tmp_path, **piped)
+    assert process.stdout.readline() == "importing\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, errors) == (-signal.SIGINT, "")
 
 

@@ -38,12 +38,10 @@ class Shown:
     def __init__(self) -> None:
         self.states: list[SampleColumns] = []
         self.forces: list[ForceColumns] = []
-        self.dropped: list[ForceColumns] = []
 
-    def take(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
+    def take(self, states: SampleColumns, forces: ForceColumns, _: ForceColumns) -> None:
         self.states.append(states)
         self.forces.append(forces)
-        self.dropped.append(dropped)
 
     @property
     def stamps(self) -> np.ndarray:
