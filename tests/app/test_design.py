@@ -39,15 +39,9 @@ def test_the_parameter_file_quenches_the_vibration(
         assert f'"{name}": {found[name]}' in found["parameter_file"]
     assert found["peak_force"] <= found["force_limit"] == 200.0
     assert found["scenario"]["name"] == "feed_drive"
-    gains = [
-        text
-        for name in ("corner_frequency", "linear_gain", "cubic_gain", "start_after")
-        for text in ("-p", f"washout_controller.{name}={found[name]}")
-    ]
-    for scenario in (("feed_drive", *LIMIT[2:], *gains), ("gains.yaml",)):
-        done = stickslip("simulate", *scenario, "--json")
-        assert json.loads(done.stdout)["regime"] == "equilibrium"
-        assert done.stderr == ""
+    done = stickslip("simulate", "gains.yaml", "--json")
+    assert json.loads(done.stdout)["regime"] == "equilibrium"
+    assert done.stderr == ""
     done = stickslip("design", "feed_drive", *LIMIT)
     for text in ("belt speed 40 mm/s", "linear gain", "delay margin", "peak force"):
         assert text in done.stdout
