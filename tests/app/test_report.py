@@ -189,6 +189,8 @@ def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:
     assert slips["stick_velocity"]["mean"] == pytest.approx(1e-3, rel=0.01)
     assert slips["each"]["stick_time"][0] is None
     assert report["position_noise"] == pytest.approx(1e-6, rel=0.1)
+    for slip_time in ("1e-320", "1e308"):  # any above 0 is taken
+        assert stickslip("report", *given, "--slip-time", slip_time).returncode == 0
 
 
 @pytest.mark.long

@@ -5,7 +5,6 @@ from math import nan
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 from stickslip_ros.motion.controller import answer
@@ -27,11 +26,6 @@ from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
-
-
-def answers(graph: Graph) -> Publisher:
-    """Return a publisher of control forces, matched with the plant."""
-    return graph.publisher(CONTROL_FORCE, 1)
 
 
 def test_jittered_forces_act_as_they_do_without_ros_and_overtaken_ones_are_published(
@@ -124,7 +118,7 @@ def test_what_comes_between_two_samples_acts_from_the_next_one(graph: Graph) -> 
     heard = graph.listen(JOINT_STATES, raw=True)
     applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
     plant = graph.add(PlantNode, wait_for=["observer"], **{"initial.position": 0.1})
-    force, tap = answers(graph), graph.publisher(DISTURBANCE_FORCE, 1)
+    force, tap = graph.publisher(CONTROL_FORCE, 1), graph.publisher(DISTURBANCE_FORCE, 1)
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
     tap.publish(pack_wrench(0, 0.5))
     graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
@@ -168,7 +162,7 @@ def test_forces_that_do_not_act_are_published_as_they_were_sent(graph: Graph, pa
     heard = graph.listen(JOINT_STATES, raw=True)
     dropped = graph.listen(DROPPED_FORCE, raw=True)
     plant = graph.add(PlantNode, pace=pace, wait_for=["observer"], rate=0.01)
-    force = answers(graph)
+    force = graph.publisher(CONTROL_FORCE, 1)
     graph.wait_until(lambda: heard, "sample 0")
     stamp = int(joint_state_columns(heard[:1])[0].stamp[0])
     sent = [
