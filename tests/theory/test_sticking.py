@@ -147,16 +147,3 @@ def test_a_stiff_drive_sticks_in_two_ranges_of_belt_speeds() -> None:
         assert sticks(above) == (belt_speed == high[0])
     for belt_speed in (0.2, 0.25, 0.3, 0.35):
         assert not sticks(replace(stiff, belt_speed=belt_speed))
-
-
-def test_exact_grazing_is_pure_slip() -> None:
-    for drive in (PAPER, FEED_DRIVE):
-        onset = sticking_onset(drive).exact
-        found = {
-            part: {
-                cycle.measures.regime
-                for cycle in limit_cycles(replace(drive, belt_speed=onset * (1.0 - part)))
-            }
-            for part in (0.0, 1e-12)
-        }
-        assert found == {0.0: {Regime.PURE_SLIP}, 1e-12: {Regime.STICK_SLIP}}
