@@ -13,22 +13,11 @@ from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import SIGN, SPEED
 from stickslip_ros.model.friction import (
     Coulomb,
-    Dahl,
-    Directional,
-    ElastoPlastic,
-    Exponential,
-    FrictionLaw,
-    Linear,
-    LuGre,
-    MaxwellSlip,
-    Stiction,
     Stribeck,
-    Table,
 )
 from stickslip_ros.model.hybrid import Instant
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.model.signals import sine
-from stickslip_ros.motion import Motion
 from tests.drives import FEED_DRIVE, PAPER
 
 
@@ -76,40 +65,6 @@ def test_a_slide_that_has_passed_a_moving_belt_slips_the_other_way(sign: float) 
     assert system.settled(mode, instant) is mode
     instant.state[SPEED] = belt_speed - 1e-3 * sign
     assert system.settled(mode, instant).switches[SIGN] == -sign
-
-
-CURVE = Exponential(0.3, 0.2, decay_speed=0.02, viscous=0.1, exponent=1.0)
-LAWS: tuple[FrictionLaw, ...] = (
-    Coulomb(0.3, viscous=0.1),
-    Linear(0.3, slope=0.4),
-    CURVE,
-    Stiction(0.3, 0.2, viscous=0.1),
-    Stribeck(0.3, 0.2, minimum_speed=0.05),
-    Table(((0.0, 0.3), (0.02, 0.22), (0.1, 0.2), (1.0, 0.25))),
-    Dahl(0.3, bristle_stiffness=5e3),
-    LuGre(CURVE, bristle_stiffness=5e3, bristle_damping=2.0),
-    ElastoPlastic(CURVE, bristle_stiffness=5e3),
-    MaxwellSlip(CURVE, bristle_stiffness=5e3, elements=2),
-    Directional(Stiction(0.3, 0.2), Stiction(0.25, 0.2)),
-)
-
-
-def moved(drive: Drive) -> tuple[float, float]:
-    motion = Motion(drive, 0.0, 0.0)
-    motion.force = 20.0
-    motion.advance(0.2)
-    return motion.position, motion.velocity
-
-
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{type(law).__name__}")
-@pytest.mark.parametrize("normal_force", [1e-3, 1.0, 1e6])
-def test_a_drive_moves_alike(law: FrictionLaw, normal_force: float) -> None:
-    usual = Drive(100.0, 20.0, 1e6, 1000.0, 0.03, friction=law, bias_force=5.0)
-    other = law.multiplied(1000.0 / normal_force)
-    assert other is not None
-    changed = replace(usual, normal_force=normal_force, friction=other)
-    assert moved(changed) == pytest.approx(moved(usual), rel=1e-9)
-    assert changed.equilibrium_position == pytest.approx(usual.equilibrium_position, rel=1e-12)
 
 
 @given(st.floats(-3.0, 6.0))

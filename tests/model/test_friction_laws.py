@@ -182,6 +182,25 @@ def test_in_other_units_it_has_the_same_coefficient_and_characteristic_speed(
 
 @every_law
 @examples(quick=10, thorough=30)
+@given(st.data(), speeds, signs, st.floats(1e-3, 1e3))
+def test_multiplied_it_has_as_many_times_the_friction_and_the_same_memory(
+    kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float, factor: float
+) -> None:
+    """Normal force and coefficients share a force: how does not matter."""
+    law = data.draw(laws(kind))
+    other, close = law.multiplied(factor), 1e-12 * largest_term(law)
+    memory = [data.draw(st.floats(-1.2, 1.2)) * each for each in law.memory_at(speed, sign)]
+    state = speed, sign, memory, law.switches_at(speed, sign, memory)
+    same = speed, sign, memory, other.switches_at(speed, sign, memory)
+    friction = law.friction(*state)
+    assert other.friction(*same) / factor == pytest.approx(friction, rel=1e-12, abs=close)
+    rates = list(law.memory_rates(*state))
+    assert list(other.memory_rates(*same)) == pytest.approx(rates, rel=1e-9, abs=close)
+    assert other.limits == pytest.approx([factor * each for each in law.limits])
+
+
+@every_law
+@examples(quick=10, thorough=30)
 @given(data=st.data())
 def test_arrays_and_symbols_give_what_numbers_give(
     kind: type[FrictionLaw], data: st.DataObject

@@ -33,15 +33,9 @@ def test_it_is_a_position_loop_around_a_velocity_loop(place: str) -> None:
 
 
 @pytest.mark.parametrize("place", ["table", "motor"])
-def test_without_its_loops_it_is_the_washout(place: str) -> None:
-    none = dict.fromkeys(GAINS, 0.0)
-    law = Cascade(**none, **WASHOUT, washout_feedback=place)
-    assert forces(law) == forces(Washout(**WASHOUT, feedback=place))
-
-
-def test_both_halves_add_up() -> None:
-    both = np.array(forces(Cascade(**GAINS, **WASHOUT)))
-    apart = np.add(forces(Cascade(**GAINS)), forces(Washout(**WASHOUT)))
+def test_the_force_of_its_washout_is_added(place: str) -> None:
+    both = forces(Cascade(**GAINS, **WASHOUT, washout_feedback=place))
+    apart = np.add(forces(Cascade(**GAINS)), forces(Washout(**WASHOUT, feedback=place)))
     np.testing.assert_allclose(both, apart, rtol=1e-12)
 
 
