@@ -72,11 +72,8 @@ def test_a_disturbance_does_not_lag() -> None:
 
 
 CHANGES = {
-    "mass": {"mass": 250.0},
-    "stiffness": {"stiffness": 3e6},
-    "normal force": {"normal_force": 2000.0},
-    "belt": {"belt_speed": -0.01},
-    "friction": {"friction": Stribeck(0.3, 0.2, 0.07)},
+    "scales": {"mass": 250.0, "stiffness": 3e6, "normal_force": 2000.0},
+    "belt and friction": {"belt_speed": -0.01, "friction": Stribeck(0.3, 0.2, 0.07)},
     "lag": {"actuator": lag(0.02)},
     "signals": {"belt": ramp(0.01, duration=0.5)},
     "memory": {"friction": Dahl(0.4, bristle_stiffness=2e5)},

@@ -73,16 +73,6 @@ def test_a_damaged_cache_is_written_anew(database: Path, fault: str) -> None:
     assert kept(database).keys() == entries.keys()
 
 
-def test_code_of_another_version_is_not_used(database: Path) -> None:
-    open_cache()
-    value = computed()
-    close(database)
-    with closing(sqlite3.connect(database)) as opened:
-        opened.execute("UPDATE cache SET env_fingerprint = 'another version', obj = x'00'")
-        opened.commit()
-    assert computed() == value
-
-
 def test_on_a_full_disk_nothing_is_kept_and_nothing_lost(
     database: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -273,15 +273,6 @@ def test_no_guard_is_passed_over(case: Case) -> None:
         assert margins_of(motion, 0.05 * number).min() > -1e-9, number
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-def test_each_direction_has_its_limit(law: FrictionLaw) -> None:
-    forward, backward = law.limits
-    drive = drive_of(law, 0.0)
-    for limit, inside in ((backward, -0.01), (-forward, 0.01)):
-        assert Motion(drive, limit + inside, 0.0).sticking == (not law.states)
-        assert not Motion(drive, limit - inside, 0.0).sticking
-
-
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 

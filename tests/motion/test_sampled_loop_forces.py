@@ -9,15 +9,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from stickslip_ros.measures.cycle_measures import Measures, Regime
-from stickslip_ros.measures.cycle_meter import CycleMeter
-from stickslip_ros.model.control import Washout
-from stickslip_ros.motion import Motion, RecordedMotion
-from stickslip_ros.motion.controller import Controller
+from stickslip_ros.motion import Motion
 from stickslip_ros.motion.force_answers import Verdict
 from stickslip_ros.motion.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.motion.simulation import simulate_sampled
-from tests.drives import FEED_DRIVE, PAPER
+from tests.drives import PAPER
 
 SECOND = 10**9
 PERIOD = SECOND // 100
@@ -417,20 +412,3 @@ def test_a_force_acts_or_is_told_to_be_overtaken_or_is_still_under_way(
     assert set(told).isdisjoint(acted)
     assert set(told) <= sent
     assert all(number > max(acted) for number in sent - acted - set(told))
-
-
-def controlled(delay: float, jitter: float) -> Measures:
-    """The feed drive with its washout, from half a second on; 1 ms from sample to sample."""
-    motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0)
-    loop = SampledLoop(motion, 1000.0, LOCKSTEP_START, force_delay=delay, force_jitter=jitter)
-    law = Controller(Washout(20.0, -3000.0, 0.0, start_after=0.5))
-    return simulate_sampled(loop, motion, law, 5.0, CycleMeter(20))
-
-
-def test_a_small_jitter_leaves_the_washout_stable_and_a_large_one_does_not() -> None:
-    """Theory has it stable up to a constant delay of 10.45 ms."""
-    assert controlled(0.008, 0.001).regime is Regime.EQUILIBRIUM
-    assert 1e-4 < (controlled(0.008, 0.01).amplitude or 0.0) < 2.5e-4
-    assert controlled(0.008, 0.05).regime is Regime.STICK_SLIP
-    # Forces that overtake keep the acting one young: twice the critical delay does no harm.
-    assert controlled(0.0, 0.02).regime is Regime.EQUILIBRIUM

@@ -74,40 +74,6 @@ def test_rounding_at_the_limit_does_not_hold_the_slide_for_ever(
     assert not motion.sticking
 
 
-@directions
-def test_a_jump_of_the_force_breaks_the_stick_at_once(direction: float) -> None:
-    motion = RecordedMotion(SLOW, 0.0, BELT)
-    motion.advance(1.0)
-    assert motion.sticking
-    motion.take_breakpoints()
-    motion.force = direction
-    motion.advance(1e-3)
-    # h = 0.204 - u: slip towards the force, with acceleration (|h| - 0.4) of that sign.
-    acceleration = -(0.204 - direction) - direction * 0.4
-    assert motion.velocity - BELT == pytest.approx(acceleration * 1e-3, rel=1e-2)
-    assert not motion.take_breakpoints().sticking.any()
-
-
-def test_a_short_hop_off_the_belt_ends_where_it_lands() -> None:
-    """With Coulomb friction and no damping the hop is a piece of a harmonic motion.
-
-    The force of 1 throws the slide forward at the belt's speed of 1: about the centre at
-    1 - 0.25, x = 0.75 - 0.05 cos t + sin t, and it is back at the belt's speed at
-    t = 2 atan(0.05).
-    """
-    drive = replace(PAPER, damping=0.0, belt_speed=1.0, friction=Coulomb(0.25))
-    motion = RecordedMotion(drive, 0.7, 1.0)
-    motion.force = 1.0
-    motion.advance(0.2)
-    hop = 2.0 * 0.04995839572194276  # atan(0.05)
-    assert motion.sticking
-    breakpoints = motion.take_breakpoints()
-    landed = breakpoints[~breakpoints.sticking]
-    assert landed.time[-1] == pytest.approx(hop, rel=1e-12)
-    assert landed.position[-1] == pytest.approx(0.8, rel=1e-12)  # as far beyond the centre
-    assert motion.position == pytest.approx(0.8 + (0.2 - hop), rel=1e-12)
-
-
 @pytest.mark.parametrize(("start", "end"), [(1.5, -0.1), (-1.5, 0.1), (0.5, 0.3), (2.05, 0.35)])
 def test_on_a_belt_at_rest_coulomb_friction_takes_the_same_from_every_swing(
     start: float, end: float

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.motion import Motion, RecordedMotion
-from stickslip_ros.motion.variational import ShootingMotion, TooStiffError
+from stickslip_ros.motion import Motion
 from tests.drives import PAPER
 
 STIFF = replace(PAPER, damping=1e9)
@@ -17,18 +16,12 @@ def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stickslip_ros.motion.hybrid_motion._SPARE_STEPS", 1000)
 
 
-def test_it_is_refused() -> None:
-    motion = Motion(STIFF, 0.0, 0.0)
+def test_it_is_refused_and_with_another_drive_goes_on_where_it_was() -> None:
+    motion = Motion(PAPER, 0.3, 0.1)
+    motion.drive = STIFF
     with pytest.raises(RunError, match="too stiff"):
         motion.advance(0.1)
     assert not motion.unbounded
-
-
-def test_with_another_drive_it_goes_on_where_it_was() -> None:
-    motion = Motion(PAPER, 0.3, 0.1)
-    motion.drive = STIFF
-    with pytest.raises(RunError):
-        motion.advance(0.1)
     position, velocity = motion.position, motion.velocity
     motion.drive = PAPER
     assert motion.position == position
@@ -50,27 +43,3 @@ def test_a_stick_however_long_is_followed_to_its_end() -> None:
     motion.advance(1e19)
     assert motion.sticking
     assert motion.position == pytest.approx(0.1)
-
-
-def test_theory_takes_it_for_too_stiff() -> None:
-    motion = ShootingMotion(STIFF)
-    with pytest.raises(TooStiffError):
-        motion.advance(0.1)
-
-
-def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    motion = RecordedMotion(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
-    for budget, steps in (("STEPS_PER_UNIT", 0.01), ("STEPS_PER_ADVANCE", 10)):
-        monkeypatch.setattr(f"stickslip_ros.motion.hybrid_motion.{budget}", steps)
-    motion.core.budget.left = 0
-    with pytest.raises(RunError):
-        motion.advance(100.0)
-    monkeypatch.undo()
-    fresh = RecordedMotion(PAPER, 0.0, 0.0)
-    motion.take_breakpoints()
-    motion = RecordedMotion(PAPER, 0.0, 0.0)  # it borrows what the refused motion has given back
-    for one in (motion, fresh):
-        one.advance(5.0)
-    assert motion.take_breakpoints().time.tolist() == fresh.take_breakpoints().time.tolist()

@@ -157,14 +157,6 @@ def test_a_law_that_fails_does_so_at_the_same_sample() -> None:
     assert failures[0] == failures[1]
 
 
-def test_a_limited_force_and_the_ends_of_runs_need_no_whole_block() -> None:
-    drive = drive_of("coulomb", 0.01, 2)
-    law = VelocityFeedback(-1.0)
-    in_parts = run(drive, law, 7, blocks=True)
-    assert in_parts.in_blocks == 6  # the first answer is the controller's
-    assert len(in_parts.forces) == 7
-
-
 class Foreign(Washout):
     """Law whose force is its own."""
 
