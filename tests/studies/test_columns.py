@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.measures.cycle_measures import CycleMeasures, Regime
+from stickslip_ros.measures.cycle_measures import CycleMeasures
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.studies.columns import COLUMNS, Columns, Point, json_entries, write_csv
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, RandomSample
@@ -66,19 +66,6 @@ def test_columns_are_the_points_in_their_order(study: Study, columns: Columns) -
     assert list(columns.points()) == points
 
 
-def test_a_point_that_is_not_done_has_nothing() -> None:
-    columns = Columns.empty(speeds(3).plan)
-    point = Point(1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP, True, (0.5,))
-    columns.enter([point])
-    assert bits(columns.amplitude) == bits([None, 0.1, None])
-    assert columns.regime.tolist() == [None, Regime.PURE_SLIP, None]
-    assert columns.steady.tolist() == [False, True, False]
-    assert columns.cycles.tolist() == [0, 2, 0]
-    assert columns.turning_points == [(), (0.5,), ()]
-    assert columns.reason.tolist() == [None] * 3
-    assert list(columns.points()) == [point]
-
-
 def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is not JSON")
 
@@ -116,19 +103,10 @@ def test_a_table_read_back_is_the_columns_to_the_last_bit(study: Study, columns:
 
 
 @one_of(["both ways"])
-def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes(
-    study: Study, columns: Columns
-) -> None:
+def test_of_a_grid_there_are_the_values_of_its_axes(study: Study, columns: Columns) -> None:
     read = as_json(study, columns, scenario={"plant.mass": 1.0})
     assert read["parameters"] == ["plant.friction.minimum", "plant.belt_speed"]
     assert read["values"] == [MINIMUM.values().tolist(), SPEED.values().tolist()]
-    amplitude = np.array(read["amplitude"], dtype=float).reshape(2, 4, 5)
-    first, last = columns.values["plant.friction.minimum"], columns.values["plant.belt_speed"]
-    for row, found in np.ndenumerate(amplitude):
-        place = np.ravel_multi_index(row, amplitude.shape)
-        assert first[place] == read["values"][0][row[1]]
-        assert last[place] == read["values"][1][row[2]]
-        assert bits([found]) == bits([columns.amplitude[place]])
     assert read["scenario"] == {"plant.mass": 1.0}
     assert read["plan"]["carry"] == "both"
     assert read["course"] == {"transient": 5.0, "cycles": 2, "patience": 1, "extensions": 4}

@@ -136,13 +136,6 @@ def test_the_last_axis_of_a_grid_varies_fastest() -> None:
     assert [axis.unit for axis in AXES] == ["m/s", "N s/m", ""]
 
 
-@pytest.mark.parametrize("carry", [None, Continuation.BOTH])
-def test_the_corners_of_a_grid_have_the_ends_of_its_axes(carry: Continuation | None) -> None:
-    grid = Grid(tuple(AXES), carry)
-    corners = [grid.values(index) for index in grid.corners()]
-    assert corners == list(product(*((axis.first, axis.last) for axis in AXES)))
-
-
 axis_counts = st.lists(st.integers(2, 7), min_size=1, max_size=3)
 
 
@@ -183,21 +176,6 @@ def test_samples_of_two_seeds_and_two_points_have_nothing_in_common() -> None:
     samples = [RandomSample(tuple(AXES), 200, seed) for seed in (0, 1, 2, 2**32, 2**40)]
     values = [value for sample in samples for i in range(200) for value in sample.values(i)]
     assert len(set(values)) == len(values)
-
-
-def test_a_sample_is_uniform_and_its_axes_are_independent() -> None:
-    axes = (Axis(SPEED, -2.0, 2.0, 2), Axis("plant.damping", 0.0, 2.0, 2))
-    sample = RandomSample(axes, 4000, 7)
-    values = np.array([sample.values(index) for index in range(sample.size)])
-    shares = (values - [-2.0, 0.0]) / [4.0, 2.0]
-    assert shares.min() >= 0.0
-    assert shares.max() <= 1.0
-    # Five standard deviations of the counts in 8 x 8 boxes, of their mean 62.5 each.
-    counts, *_ = np.histogram2d(*shares.T, bins=8, range=[[0, 1], [0, 1]])
-    assert np.abs(counts - 62.5).max() < 5.0 * 62.5**0.5
-    neighbours = np.corrcoef(shares[:-1, 0], shares[1:, 0])[0, 1]
-    assert abs(neighbours) < 5.0 / 4000**0.5
-    assert abs(np.corrcoef(*shares.T)[0, 1]) < 5.0 / 4000**0.5
 
 
 def test_a_sample_that_cannot_be_is_refused() -> None:

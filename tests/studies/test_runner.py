@@ -179,18 +179,6 @@ def test_a_million_points_are_a_few_thousand_tasks(monkeypatch: pytest.MonkeyPat
     assert few.tasks >= 4 * 8
 
 
-def test_progress_is_told_how_many_points_are_done(tmp_path: Path) -> None:
-    study = speeds(10)
-    path = tmp_path / "study.part"
-    told: list[float] = []
-    with Journal(study, path) as journal:
-        run(journal, progress=told.append)
-    assert told == [0, 3, 6, 9, 10]
-    with Journal(study, path) as journal:
-        run(journal, progress=(again := list[float]()).append)
-    assert again == [10]
-
-
 class _Held(Executor):
     """Finishes the task before last when the next one comes: one is finished and not asked for."""
 

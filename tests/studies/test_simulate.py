@@ -1,17 +1,14 @@
-"""An observer receives the forces of the simulation that is measured, and does not change it."""
+"""What an observer receives of a simulation, and what rounding leaves of a motion."""
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 
-from stickslip_ros.measures.cycle_measures import Measures, Regime
-from stickslip_ros.motion.trajectory import TrajectoryRecorder
+from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.show.run_history import RunHistory
 from stickslip_ros.studies.simulate import simulate
-from tests.studies.studies import free, paper
 
 
 @pytest.mark.parametrize("continuous", [False, True])
@@ -27,28 +24,6 @@ def test_forces_and_friction_are_seen_with_the_motion(continuous: bool) -> None:
     assert not force[time < 4.99].any()
     assert force[time > 5.01].any()
     assert np.abs(friction).max() <= scenario.plant.as_drive().friction.static + 1e-12
-
-
-@pytest.mark.parametrize("belt_speed", [0.4, 2.0])
-@pytest.mark.parametrize("continuous", [False, True])
-def test_a_slide_that_settles_slowly_is_measured_the_same_when_it_is_drawn(
-    continuous: bool, belt_speed: float
-) -> None:
-    """Overdamped, it never turns: what counts is the motion since a breakpoint."""
-    slow = "plant.damping=30.0", "plant.rate=2.0", f"plant.belt_speed={belt_speed}"
-    scenario = paper(*slow) if continuous else free(*slow)
-
-    def measured(**seen: Any) -> Measures:
-        return simulate(scenario, 300.0, continuous=continuous, **seen)
-
-    alone = measured()
-    assert alone.regime is Regime.EQUILIBRIUM
-    others = {"observer": RunHistory()}, {"recorder": TrajectoryRecorder(scenario.plant.rate)}
-    for other in (*others, others[0] | others[1]):
-        found = measured(**other)
-        assert (found.regime, found.steady) == (alone.regime, alone.steady)
-        for name in ("amplitude", "velocity_amplitude", "midpoint"):
-            assert getattr(found, name) == pytest.approx(getattr(alone, name), rel=1e-9)
 
 
 @pytest.mark.parametrize("law", ["dahl", "lugre"])

@@ -83,16 +83,6 @@ def test_the_equilibrium_under_control_is_told_beside_that_without() -> None:
     assert f"up to 43.95 mm/s (searched from {1e3 * lowest:.4g} mm/s)" in shown
 
 
-@pytest.mark.long
-def test_a_neutral_equilibrium_is_called_so() -> None:
-    found, notes = stability(
-        load_scenario("paper", ["plant.friction.law=coulomb", "plant.damping=0"])
-    )
-    assert found["open_loop"]["stable"] is None
-    assert notes["open_loop.stable"].startswith("it is neutral")
-    assert found["closed_loop"]["stable"] is True
-
-
 def _lines(scenario: Scenario, found: Section, notes: Notes) -> list[str]:
     tables = stability_tables(scenario, found, notes)
     return [line for part in tables if not isinstance(part, str) for line in part.lines()]
