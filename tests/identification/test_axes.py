@@ -247,16 +247,6 @@ def test_the_committed_study_of_falling_friction() -> None:
     assert study["known"] >= 0.8 * study["driven"]
 
 
-def test_the_constants_of_other_laws_of_an_axis() -> None:
-    found = identify([record("saturating", 6.0)], "exponential", {"force_delay": 0.0})
-    names = ("static", "kinetic", "decay_speed", "viscous")
-    groups = ("friction.", "friction.reverse.")
-    assert found.fitted.keys() >= {f"{group}{name}" for group in groups for name in names}
-    law = found.drive.friction.forward
-    assert found.fitted["friction.static"].value == pytest.approx(law.static)
-    assert found.fitted["friction.viscous"].standard_error > 0.0
-
-
 def test_friction_that_follows_the_curve_over_a_path_is_fitted() -> None:
     found = identify([record("saturating", 3.0)], "lugre", {"force_delay": 0.0})
     assert found.fitted["mass"].value == pytest.approx(95.0, rel=0.03)

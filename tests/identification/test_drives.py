@@ -20,15 +20,13 @@ from stickslip_ros.identification.even_clock import evenly_spaced
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.fit import OUT_OF_TIME
-from stickslip_ros.identification.identified_law import DELAY, LAG
+from stickslip_ros.identification.identified_law import LAG
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.law_search import LawSearch
 from stickslip_ros.identification.laws import KNOWN_LAWS
 from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.sentences import notes, unidentified
-from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
@@ -74,30 +72,6 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.candidates[0].remark == OUT_OF_TIME
     assert {estimate.standard_error for estimate in found.fitted.values()} == {inf}
     assert "limit of work" in unidentified(found)["stiffness"]
-
-
-def test_time_passes_with_work_alone() -> None:
-    limit = TimeLimit(10.0)
-    limit.begin_stage(0.5)
-    limit.begin_part(0.5)
-    limit.spend(2.0)
-    assert not limit.is_over
-    limit.spend(1.0)
-    assert limit.is_over
-    limit.begin_part(1.0)
-    assert not limit.is_over
-    limit.spend(2.0)
-    assert limit.is_over
-
-
-@pytest.mark.long
-def test_a_law_that_another_excels_gets_no_further_constants() -> None:
-    own = study.record("coulomb", "ramp", seed=7, duration=1.5, delay=2e-3)
-    task = LawSearch([own], {"normal_force": study.NORMAL_FORCE}, TimeLimit())
-    near = task.searched(KNOWN_LAWS["coulomb"])
-    least = near[0].loss
-    assert DELAY in task.extended(near, least).names
-    assert task.extended(near, 1e-3 * least) is near[0]
 
 
 @pytest.mark.parametrize(

@@ -144,13 +144,6 @@ def test_cycles_of_long_ago_do_not_count() -> None:
     check_equilibrium(meter.measures(), 0.2584)
 
 
-def test_riding_a_belt_at_rest_is_stuck() -> None:
-    measures = measured(recorded(AT_REST, 3.0, 0.0, 60.0), 0.0)
-    assert measures.regime is Regime.STUCK
-    assert measures.period is None
-    assert measures.frequency is None
-
-
 def test_sticking_now_and_then_on_a_belt_at_rest_is_not_stuck() -> None:
     """A force that alternates between 1 and -1 moves the slide at each turn, then it sticks."""
     motion = RecordedMotion(AT_REST, 0.0, 0.0)
@@ -176,29 +169,10 @@ def test_a_slide_that_creeps_on_a_guide_at_rest_is_not_stuck_while_it_rests() ->
     assert measured(creeping, belt_speed=0.0).regime is Regime.STUCK
 
 
-def test_a_motion_reported_as_diverging_is_unbounded() -> None:
-    meter = CycleMeter(window=20)
-    meter.feed(vibration(5.25), 1.0)
-    meter.unbounded = True
-    assert meter.measures().regime is Regime.UNBOUNDED
-    assert meter.measures().period is None
-    assert meter.measures().frequency is None
-
-
 @pytest.mark.parametrize("duration", [0.1, 3.0, 9.0])
 def test_too_short_a_motion_has_no_cycle_and_no_regime(duration: float) -> None:
     measures = measured(recorded(PAPER, 0.0, 0.0, duration), 0.4)
     assert measures == Measures(None, None, None, None, None, None, 0, None)
-
-
-def test_no_cycle_spans_an_interruption() -> None:
-    meter = CycleMeter(window=20)
-    whole = vibration(8.0)
-    first = meter.feed(whole[:14], 1.0)
-    meter.interrupt()
-    second = meter.feed(replace(whole, time=whole.time + 1000.0)[16:], 1.0)
-    assert (len(first), len(second)) == (2, 2)
-    assert [cycle.period for cycle in [*first, *second]] == pytest.approx([2.0 * pi] * 4)
 
 
 MOTIONS = {
