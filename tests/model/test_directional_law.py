@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.model.friction import (
-    LAWS,
     Coulomb,
     Dahl,
     Directional,
@@ -19,7 +18,6 @@ from stickslip_ros.model.friction import (
     Table,
 )
 from stickslip_ros.model.plain_drive import drive_system
-from stickslip_ros.motion import Motion
 from stickslip_ros.theory.linear import expand
 from tests.drives import PAPER
 
@@ -83,17 +81,6 @@ def test_laws_of_one_structure_share_their_flows() -> None:
     assert structure(tables[0]) == structure(tables[1])
     assert structure(Exponential(exponent=2.0)) != structure(Exponential())
     assert structure(Exponential(exponent=1.5)) == structure(Exponential(exponent=1.75))
-
-
-@pytest.mark.parametrize("name", ["stribeck", "table", "lugre", "maxwell_slip"])
-def test_two_equal_laws_move_as_one(name: str) -> None:
-    law = LAWS[name]()
-    one = Motion(replace(PAPER, friction=law), 0.0, 0.0)
-    two = Motion(replace(PAPER, friction=Directional(law, law)), 0.0, 0.0)
-    for motion in (one, two):
-        motion.advance(60.0)
-    assert two.position == pytest.approx(one.position, rel=0.0, abs=1e-10)
-    assert two.velocity == pytest.approx(one.velocity, rel=0.0, abs=1e-10)
 
 
 def test_a_belt_that_moves_forward_has_the_law_of_backward_slip() -> None:

@@ -32,7 +32,7 @@ from stickslip_ros.model.friction import (
 )
 from stickslip_ros.model.hybrid import HybridSystem, Instant
 from stickslip_ros.model.signals import NO_SIGNAL, Signal, ramp, sine
-from stickslip_ros.motion import Motion, RecordedMotion, compiled_flow
+from stickslip_ros.motion import Motion, RecordedMotion
 from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
 from stickslip_ros.motion.compiled_flow import parameter_values
 from stickslip_ros.motion.phase import Phase
@@ -304,9 +304,3 @@ def test_the_energy_gained_is_the_work_done(case: Case) -> None:
     ]
     unit = drive.stiffness * drive.length_scale**2
     assert (energies[1] - energies[0]) / unit == pytest.approx(work / unit, abs=1e-8)
-
-
-def test_an_ended_motion_gives_its_integrator_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    Motion(drive_of(LAWS[0], 0.3), 0.0, 0.0).advance(5.0)
-    monkeypatch.setattr(compiled_flow, "_compile", lambda *_: pytest.fail("compiles again"))
-    Motion(drive_of(LAWS[0], 0.2), 0.0, 0.0).advance(5.0)

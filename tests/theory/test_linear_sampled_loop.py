@@ -161,17 +161,12 @@ def test_a_law_that_is_not_linear_is_refused_by_name() -> None:
 LUGRE = replace(FEED_DRIVE, friction=LuGre(Exponential(0.4, 0.25, 0.02), 1e5, 100.0))
 CONTROL_LAWS = (Washout(20.0, -3000.0, 0.0), VelocityFeedback(-2500.0))
 SAMPLES = 60
-ROUGH = {"position_resolution": 1e-6, "position_noise": 1e-6}
 
 
-def sensor(spans: int, **others: Any) -> Sensor:
+def sensor(spans: int) -> Sensor:
     if spans == 0:
-        return Sensor(**others)
-    return Sensor(velocity=MeasuredVelocity.DIFFERENCE, difference_samples=spans, **others)
-
-
-def linear_loop(drive: Drive, delay: float, spans: int) -> LinearSampledLoop:
-    return loop_of(drive, 1000.0, delay, sensor(spans))
+        return EXACT_SENSOR
+    return Sensor(velocity=MeasuredVelocity.DIFFERENCE, difference_samples=spans)
 
 
 def response(drive: Drive, law: Any, rate: float, delay: float, spans: int) -> np.ndarray:
@@ -246,7 +241,8 @@ def test_the_matrix_is_that_of_the_loop(
 )
 def test_the_stable_gains(drive: Drive, delay: float, lag: float, spans: int) -> None:
     """Against the eigenvalues at very many gains."""
-    loop = linear_loop(replace(drive, actuator=Actuator(time_constant=lag)), delay, spans)
+    drive = replace(drive, actuator=Actuator(time_constant=lag))
+    loop = loop_of(drive, 1000.0, delay, sensor(spans))
     intervals = loop.stable_linear_gains(20.0)
     scale = max([5000.0, *(abs(end) for interval in intervals for end in interval)])
     gains = np.linspace(-1.47 * scale, 1.43 * scale, 601)
@@ -270,11 +266,3 @@ def test_a_difference_over_no_multiple_of_the_answers_is_not_covered() -> None:
     sampling = FEED_DRIVE, 1000.0, 0.0, sensor(3), EXACT_SENSOR, 2
     assert LinearSampledLoop.from_drive(*sampling) is None
     assert "a difference over 3 samples, which must be a multiple" in why_no_linear_loop(*sampling)
-
-
-def test_what_is_not_linear_is_left_out() -> None:
-    limited = replace(FEED_DRIVE, actuator=Actuator(limit=10.0, resolution=1.0))
-    rough = LinearSampledLoop.from_drive(limited, 1000.0, 0.0, sensor(2, **ROUGH))
-    smooth = linear_loop(FEED_DRIVE, 0.0, 2)
-    matrices = [loop.transition_matrix(CONTROL_LAWS[0]) for loop in (rough, smooth)]
-    assert np.array_equal(*matrices)
