@@ -27,6 +27,7 @@ from stickslip_ros.identification.predictor import Predictor
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import repetition_of
 from stickslip_ros.identification.sentences import notes, unidentified
+from stickslip_ros.identification.time_limit import TimeLimit
 from stickslip_ros.model.actuator import Actuator
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.friction import Coulomb, Directional, FrictionLaw, Table
@@ -72,6 +73,20 @@ def test_a_search_ends_with_the_best_so_far() -> None:
     assert found.candidates[0].remark == OUT_OF_TIME
     assert {estimate.standard_error for estimate in found.fitted.values()} == {inf}
     assert "limit of work" in unidentified(found)["stiffness"]
+
+
+def test_time_passes_with_work_alone() -> None:
+    limit = TimeLimit(10.0)
+    limit.begin_stage(0.5)
+    limit.begin_part(0.5)
+    limit.spend(2.0)
+    assert not limit.is_over
+    limit.spend(1.0)
+    assert limit.is_over
+    limit.begin_part(1.0)
+    assert not limit.is_over
+    limit.spend(2.0)
+    assert limit.is_over
 
 
 @pytest.mark.parametrize(
