@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.measures.noise import medians
 
 _NEAR_STEPS = 0.6
 """Distance from a rest that is none, in steps of the encoder."""
@@ -107,7 +108,7 @@ def _line(position: FloatArray, rest: Rest, near: float, size: float) -> tuple[f
 def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> tuple[float, float]:
     """Return the row at which a course leaves zero on its way to a slip of this size; its error."""
     distance = np.abs(course)
-    inside, over = (distance <= near).nonzero()[0], (course < -_OVER * near).nonzero()[0]
+    inside, over = (distance <= near).nonzero()[0], (medians(course) < -_OVER * near).nonzero()[0]
     over = over[over > inside[0]] if len(inside) else over[:0]
     if len(over):  # beyond the rest, from where the slide comes back
         inside, size = inside[inside < over[0]], -float(course.min())
@@ -118,7 +119,7 @@ def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> t
     if len(values) < 3:
         # A distance that grows with the square of time is near the rest for this many rows; the
         # edge is between half of them and none.
-        hidden = max(len(values), 1) / (sqrt(far / near) - 1.0)
+        hidden = max(len(values) - 0.5, 0.5) / (sqrt(far / near) - 1.0)
         return last + 0.5 - hidden / 2.0, hypot(_ROW_ERROR, 0.3, hidden / 2.0)
     half = (len(values) - 1) / 2.0
     middle, lag = last + 1.0 + half, np.arange(-half, half + 1.0)

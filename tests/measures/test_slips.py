@@ -143,5 +143,5 @@ def test_where_cycles_are_not_alike_rests_and_slips_tell_how_long_it_sticks(quic
     found = records.fed(told, SampleAssumptions(noisy=True)).measures(quick=quick)
     assert found.regime is Regime.STICK_SLIP
     assert found.errors is not None
-    assert 0.02 < found.errors["stick_fraction"] < 0.06
+    assert 0.02 < found.errors["stick_fraction"] < 0.1
     assert found.stick_fraction == pytest.approx(0.727, abs=2 * found.errors["stick_fraction"])

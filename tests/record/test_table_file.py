@@ -114,6 +114,17 @@ def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: P
         assert note in recording.notes
 
 
+@pytest.mark.parametrize("first", [0, 2])
+def test_rows_that_only_repeat_a_position_are_left_out(tmp_path: Path, first: int) -> None:
+    """A trace is often faster than what it records."""
+    shown = np.repeat(POSITION[::4], 4)[: len(TIME)]
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME[first:], x=shown[first:]))
+    recording = read_table(path, {"time": "t", "position": "x"})
+    assert recording.samples.position.tolist() == POSITION[4 if first else 0 :: 4].tolist()
+    assert set(np.diff(recording.samples.stamp)) == {4_000_000}
+    assert any("changes in every 4 rows only" in note for note in recording.notes)
+
+
 @pytest.mark.process
 def test_rows_of_vectors_are_those_that_are_wanted(tmp_path: Path) -> None:
     path, columns = tmp_path / "log.mat", {"time": "log.t", "position": "log.x"}
