@@ -84,12 +84,6 @@ def test_holds_what_ros_looks_for(content, stem, checkout):
         assert content.getinfo(f"{data}/{stub}").external_attr >> 16 & 0o111 == 0o111
 
 
-def test_names_its_extras(header):
-    extras = {"analysis", "dashboard", "dask", "dev", "docs", "formats", "matlab", "ros", "test"}
-    assert set(header.get_all("Provides-Extra")) == extras
-    assert header["Requires-Python"] == ">=3.11"
-
-
 def distributions(requirements, extras):
     """Installed packages that pip would install for these."""
     found = {}
