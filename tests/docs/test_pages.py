@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from stickslip_ros.nodes.base.network import own_domain, this_machine_only
+from stickslip_ros.nodes.base.network import environment, own_domain, this_machine_only
 from stickslip_ros.scenarios.files import load_scenario
 from tests.docs.page import CHECKOUT, DIRECTIVES, Block, blocks, directives_file, pages
 from tests.docs.shell import Shell
@@ -29,10 +29,8 @@ REFUSALS = ("Setting parameter failed", "Transitioning failed")
 
 
 @pytest.fixture
-def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Shell]:
-    for name, value in this_machine_only().items():
-        monkeypatch.setenv(name, value)
-    with own_domain() as domain:
+def shell(tmp_path: Path) -> Generator[Shell]:
+    with environment(this_machine_only()), own_domain() as domain:
         yield Shell(tmp_path, domain)
 
 
