@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Iterator
 from contextlib import closing
-from math import sqrt
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,7 +17,7 @@ from sensor_msgs.msg import JointState
 
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.endpoints import message_class
-from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.base.network import environment, this_machine_only
 from stickslip_ros.nodes.base.process import loopback_session
 from stickslip_ros.record.codec import BELT, SLIDE, pack_joint_state, pack_wrench
 from stickslip_ros.record.topics import (
@@ -30,7 +29,7 @@ from stickslip_ros.record.topics import (
     JOINT_STATES,
     STICK_FRACTION,
 )
-from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph
 
@@ -57,15 +56,16 @@ def messages() -> Messages:
     made = {full_name(topic): message_class(topic.type_name)() for topic in PLOTTED}
     state = pack_joint_state(0, (0, 0), (0, 0), (0, 0))
     made[full_name(JOINT_STATES)] = deserialize_message(state, JointState)
-    with pytest.MonkeyPatch.context() as environment, own_domain() as domain:
-        for name, value in this_machine_only().items():
-            environment.setenv(name, value)
-        with closing(Graph(domain)) as graph:
-            heard = graph.listen(DIAGNOSTICS)
-            graph.add_active(AnalyzerNode)
-            heard.clear()
-            graph.wait_until(lambda: heard, "it tells its health")
-            made[DIAGNOSTICS.name] = heard[-1]
+    with (
+        environment(this_machine_only()),
+        own_domain() as domain,
+        closing(Graph(domain)) as graph,
+    ):
+        heard = graph.listen(DIAGNOSTICS)
+        graph.add_active(AnalyzerNode)
+        heard.clear()
+        graph.wait_until(lambda: heard, "it tells its health")
+        made[DIAGNOSTICS.name] = heard[-1]
     return made
 
 
@@ -118,14 +118,6 @@ def curves() -> set[str]:
     return names
 
 
-def panels(tree: Any) -> list[str]:
-    return [tree] if isinstance(tree, str) else panels(tree["first"]) + panels(tree["second"])
-
-
-def test_foxglove_shows_each_panel_once() -> None:
-    assert sorted(panels(FOXGLOVE["layout"])) == sorted(FOXGLOVE["configById"])
-
-
 def test_foxglove_plots_one_number_each(messages: Messages) -> None:
     for path in set(foxglove_paths(plots_only=True)):
         (value,) = by_message_path(path, messages)
@@ -158,22 +150,6 @@ def test_plotjuggler_finds_every_curve(messages: Messages) -> None:
     assert curves()
     assert curves() | sources <= known | made
     assert made <= curves()
-
-
-def test_the_phase_portrait_of_plotjuggler_is_scaled_by_the_natural_frequency() -> None:
-    """Its circles are those of the drive that the layout is for."""
-    plant = load_scenario("feed_drive").plant
-    (function,) = PLOTJUGGLER.iter("function")
-    factor = sqrt(plant.stiffness / plant.mass)
-    assert function.text == f"return {factor:g} * value"
-
-
-def test_both_draw_what_there_is_to_draw() -> None:
-    topics = {full_name(topic) for topic in PLOTTED}
-    (selected,) = PLOTJUGGLER.iter("selected_topics")
-    assert set(selected.attrib["value"].split(";")) == topics
-    assert {path.partition(".")[0] for path in foxglove_paths(plots_only=True)} == topics
-    assert {t for t in topics if any(c.startswith(f"{t}/") for c in curves())} == topics
 
 
 def test_rviz_and_foxglove_show_the_model_where_it_is_published() -> None:
