@@ -5,7 +5,7 @@ import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
-from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.base.network import environment, this_machine_only
 from stickslip_ros.testing import own_domain
 
 ReadByRos = Callable[..., dict[str, Any]]
@@ -15,10 +15,8 @@ OWN = {"use_sim_time": False, "start_type_description_service": True}
 
 
 @pytest.fixture
-def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
+def read_by_ros() -> Iterator[ReadByRos]:
     """Parameters that ROS itself gives to a node from a file; RuntimeError if there are none."""
-    for name, value in this_machine_only().items():
-        monkeypatch.setenv(name, value)
     context = Context()
 
     def read(path: str, namespace: str = "/feed_drive", node: str = "plant") -> dict[str, Any]:
@@ -37,7 +35,7 @@ def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
         values = {name: found.value for name, found in parameters.items()}
         return {name: value for name, value in values.items() if value is not OWN.get(name)}
 
-    with own_domain() as domain:
+    with environment(this_machine_only()), own_domain() as domain:
         context.init(domain_id=domain)
         try:
             yield read

@@ -1,14 +1,13 @@
 """Friction as parameters: constants by direction, and measured curves from files."""
 
 import json
-from math import inf, isnan, nan
+from math import inf, nan
 from pathlib import Path
 
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.model.constants import constants_of
-from stickslip_ros.model.friction import LAWS, Directional, Exponential, Stribeck, Table
+from stickslip_ros.model.friction import Directional, Exponential, Stribeck, Table
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
 from stickslip_ros.scenarios.template import scenario_schema
@@ -23,24 +22,6 @@ def curve(tmp_path: Path) -> Path:
     path = tmp_path / "curve.csv"
     path.write_text(CURVE)
     return path
-
-
-def test_every_constant_has_one_for_backward_slip() -> None:
-    known = PlantParameters().known
-    for law in LAWS.values():
-        for constant in constants_of(law).values():
-            if constant.whole or constant.name in law.direction_independent:
-                assert f"friction.reverse.{constant.name}" not in known
-                continue
-            parameter = known[f"friction.reverse.{constant.name}"]
-            forward = known[f"friction.{constant.name}"]
-            assert parameter.unit == forward.unit
-            assert parameter.bounds == forward.bounds
-            assert isnan(parameter.default)
-            assert parameter.text(parameter.default) == "as forward"
-            assert parameter.finite
-            assert parameter.range is None
-            assert "for v_r < 0" in parameter.meaning
 
 
 def test_constants_for_backward_slip_make_a_law_of_two_directions() -> None:

@@ -8,7 +8,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.model.constants import Changes, Parameter
-from stickslip_ros.model.friction import LAWS
 from stickslip_ros.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
@@ -38,15 +37,6 @@ def test_defaults_and_what_may_change_while_active() -> None:
     assert {p.name for p in known("plant").values() if p.changes is not Changes.LIVE}.isdisjoint(
         PlantParameters().drive_names()
     )
-
-
-def test_every_friction_law_can_be_chosen_and_made() -> None:
-    assert known("plant")["friction.law"].choices == tuple(LAWS)
-    for name, law in LAWS.items():
-        if name == "table":  # it needs a file
-            continue
-        plant = PlantParameters().changed({"friction.law": name}, "test")
-        assert type(plant.as_drive().friction) is law
 
 
 def test_the_last_sample_of_a_plant() -> None:

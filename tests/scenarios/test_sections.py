@@ -54,15 +54,6 @@ def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path
     assert str(scenario.path) == str(tmp_path / "scenario.yaml")
 
 
-def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
-    parameters = "{use_sim_time: true, mass: 7.0, window: 5}"
-    scenario = load_scenario(scenario_file(tmp_path, section("/**", parameters)))
-    assert scenario.plant.use_sim_time
-    assert scenario.washout_controller.use_sim_time
-    assert scenario.analyzer.use_sim_time
-    assert (scenario.plant.mass, scenario.analyzer.window) == (7.0, 5)
-
-
 PLANT = section("/**/plant", "{mass: 80.0, friction: {static: 0.5}}")
 BASE = section("/**/scenario", "{base: feed_drive}")
 
