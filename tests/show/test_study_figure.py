@@ -46,7 +46,7 @@ def swept(
 @pytest.fixture(scope="module")
 def over_two() -> Swept:
     """Of which the static coefficients below the minimum, 0.25, cannot be."""
-    return swept("plant.friction.static=0.1:0.6:6", "plant.belt_speed=0.1:0.7:5")
+    return swept("plant.friction.static=0.1:0.6:6", "plant.belt_speed=0.1:0.7:5:log")
 
 
 def places(axes: Axes) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def test_an_axis_may_be_logarithmic_below_zero() -> None:
 
 @in_styles
 def test_a_map_has_each_regime_where_it_is(over_two: Swept, style: str) -> None:
-    """Static coefficients from left to right, belt speeds upward."""
+    """Static coefficients from left to right, belt speeds upward, on a logarithmic axis."""
     figure = map_figure(*over_two, style=STYLES[style])
     assert faults(figure) == []
     (axes,) = figure.axes
@@ -135,7 +135,7 @@ def test_a_map_has_each_regime_where_it_is(over_two: Swept, style: str) -> None:
     found = cells(axes)
     sticks, rests = found[ORANGE], found[GREEN]
     assert sticks[0] > rests[0]
-    assert sticks[1] < rests[1]
+    assert 0.1 < sticks[1] < rests[1] < 0.7
     assert min(sticks[2], rests[2]) > 3 > found.get(BLUE, (0.0, 0.0, 0))[2]
 
 
@@ -146,16 +146,6 @@ def test_the_map_of_a_measure_has_a_colour_bar(over_two: Swept, style: str) -> N
     _, bar = figure.axes
     assert bar.get_ylabel() == "amplitude (dimensionless)"
     assert set(legend_texts(figure)) == {"no result", "Hopf bifurcation", "stick-slip onset"}
-
-
-def test_a_map_ends_where_the_sweep_does_and_a_stick_fraction_has_no_prefix() -> None:
-    over = ("plant.damping=100:800:3:log", "plant.belt_speed=0.002:0.06:3:log")
-    si = (FREE, "plant.mass=100.0", "plant.stiffness=1e6", "plant.normal_force=1000.0")
-    axes, bar = map_figure(*swept(*over, overrides=si), "stick_fraction").axes
-    assert axes.get_xlim() == pytest.approx((100.0, 800.0))
-    assert axes.get_ylim() == pytest.approx((0.002, 0.06))
-    assert bar.get_ylabel() == "stick fraction"
-    assert bar.get_ylim()[1] <= 1.0
 
 
 @pytest.mark.long
@@ -187,7 +177,9 @@ BASINS = [
     Attractor(Regime.EQUILIBRIUM, True, None, None, 375, 0.312, 0.007),
 ]
 X, Y = Axis(POSITION, -2.0, 2.0, 40), Axis(VELOCITY, -1.0, 1.0, 30)
-POSITIONS, VELOCITIES = (each.ravel() for each in np.meshgrid(X.values(), Y.values()))
+POSITIONS, VELOCITIES = (
+    each.ravel() for each in np.meshgrid(X.values(), Y.values(), indexing="ij")
+)
 
 
 def at_rest(position: npt.NDArray[Any], velocity: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
@@ -215,7 +207,7 @@ def drawn_basins(
 @in_styles
 def test_of_a_grid_each_basin_has_its_cells(style: str) -> None:
     found = at_rest(POSITIONS, VELOCITIES)
-    figure = drawn_basins(Grid((Y, X)), POSITIONS, VELOCITIES, found, BASINS, style=style)
+    figure = drawn_basins(Grid((X, Y)), POSITIONS, VELOCITIES, found, BASINS, style=style)
     assert faults(figure) == []
     (axes,) = figure.axes
     assert axes.get_xlabel() == "initial displacement $X(0)$ (dimensionless)"
@@ -231,20 +223,6 @@ def test_of_a_grid_each_basin_has_its_cells(style: str) -> None:
     assert "the motion that each of 1200 starts leads to" in figure.get_suptitle().replace(
         "\n", " "
     )
-
-
-def test_a_grid_may_have_the_positions_first() -> None:
-    velocity, position = (each.ravel() for each in np.meshgrid(Y.values(), X.values()))
-    # There are as many attractors as look different.
-    attractors = [Attractor(regime, True, None, None) for regime in MANY]
-    attractor = np.arange(1200) % len(MANY)
-    figure = drawn_basins(Grid((X, Y)), position, velocity, attractor, attractors)
-    (axes,) = figure.axes
-    first = attractor == 0
-    middle = position[first].mean(), velocity[first].mean(), first.sum()
-    assert cells(axes)[ORANGE] == pytest.approx(middle, abs=1e-9)
-    patches: Any = figure.legends[0].legend_handles[: len(MANY)]
-    assert len({(patch.get_facecolor(), patch.get_hatch()) for patch in patches}) == len(MANY)
 
 
 def test_scattered_starts_are_in_the_units_of_the_drive() -> None:
@@ -267,8 +245,3 @@ def test_scattered_starts_are_in_the_units_of_the_drive() -> None:
 def test_regimes_differ_in_more_than_colour() -> None:
     for place in ("marker", "label", "colour"):
         assert len({getattr(look, place) for look in REGIMES.values()}) == len(REGIMES)
-    # Those that have none are as different as dark and bright.
-    assert [regime for regime, look in REGIMES.items() if not look.hatch] == [
-        Regime.STICK_SLIP,
-        Regime.UNBOUNDED,
-    ]

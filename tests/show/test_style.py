@@ -6,7 +6,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib as mpl
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -17,10 +16,8 @@ from stickslip_ros.show.style import (
     SCREEN,
     STYLES,
     FigureStyle,
-    finish,
     save,
     styled,
-    text_width,
     title_of,
 )
 
@@ -117,38 +114,6 @@ def test_a_size_that_is_asked_for_beats_that_of_the_style_and_a_title_may_be_lef
     assert figure.get_suptitle() == ""
     assert figure.get_size_inches().tolist() == [6.0, 5.0]
     assert figure.axes[0].xaxis.label.get_size() == 8.0
-
-
-def test_the_width_of_a_text_is_that_of_the_drawn_one() -> None:
-    figure = small_figure("velocity $x'$ (mm/s)")
-    figure.draw_without_rendering()
-    label = figure.axes[0].xaxis.label
-    drawn = label.get_window_extent().width / figure.dpi
-    assert text_width(label.get_text(), label.get_size()) == pytest.approx(drawn, rel=0.05)
-
-
-def test_a_label_that_is_longer_than_its_axis_has_two_lines() -> None:
-    figure = Figure((4.0, 4.0))
-    axes = figure.subplots(2, 1, height_ratios=(4.0, 1.0))
-    for each in axes:
-        each.set_ylabel("measured less fitted (µm)")
-    finish(figure)
-    assert axes[0].get_ylabel() == "measured less fitted (µm)"
-    assert axes[1].get_ylabel() == "measured less\nfitted (µm)"
-    narrow = Figure((1.5, 4.0))
-    (axes,) = narrow.subplots(1, 1, squeeze=False)[0]
-    axes.set_xlabel("velocity relative to the belt (mm/s)")
-    finish(narrow)
-    assert axes.get_xlabel() == "velocity relative\nto the belt (mm/s)"
-
-
-def test_ticks_are_round() -> None:
-    figure = small_figure()
-    (axes,) = figure.axes
-    axes.set_xlim(0.08, 0.1)
-    finish(figure)
-    steps = np.diff(axes.get_xticks())
-    assert f"{steps[0]:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")
 
 
 def test_a_title_names_what_is_shown_the_drive_and_the_control() -> None:
