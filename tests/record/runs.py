@@ -42,6 +42,14 @@ def joint_state(stamp, position, velocity, effort, names=("slide", "belt"), fram
     return message
 
 
+def csv_of(path, **columns):
+    """Write columns of numbers to a CSV file, to the last digit; return its path."""
+    rows = zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
 STAMPS = [5 * SECOND + n * SECOND // 100 for n in range(1000)]
 
 

@@ -9,6 +9,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.faults import Jumps, velocity_fault
 from stickslip_ros.record.table_file import read_table
+from tests.record.runs import csv_of
 
 TIME = 1e-3 * np.arange(4000, dtype=np.float64)
 ANGLE = 2.0 * np.pi * 1.5 * TIME
@@ -21,13 +22,6 @@ def sawtooth(rate: float) -> FloatArray:
     """Stick-slip whose slips take 20 ms."""
     time = np.arange(0.0, 20.0, 1.0 / rate) % 0.9
     return np.where(time < 0.88, 0.01 * time, 0.0088 * (0.9 - time) / 0.02)
-
-
-def table_of(path: Path, **columns: FloatArray) -> Path:
-    rows = zip(*(each.tolist() for each in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return path
 
 
 @pytest.mark.parametrize("position", [POSITION, COARSE])
@@ -57,7 +51,7 @@ def test_motions_have_no_faults(rate: float, step: float, noise: float) -> None:
 def test_an_encoder_behind_a_command_flickers_by_a_step_without_a_fault(tmp_path: Path) -> None:
     command = np.round(70.0 * TIME, 4)
     lag = 0.07 + 0.0008 * np.exp(-TIME) * np.sin(ANGLE)
-    path = table_of(tmp_path / "log.csv", t=TIME, cmd=command, act=np.round(command - lag, 3))
+    path = csv_of(tmp_path / "log.csv", t=TIME, cmd=command, act=np.round(command - lag, 3))
     found = read_table(path, {"time": "t", "position": "(cmd-act)*1e-3"})
     assert not any("jumps" in note for note in found.notes)
     assert found.samples.is_valid.all()
@@ -95,13 +89,13 @@ def test_what_is_left_out_of_a_table_is_said(tmp_path: Path) -> None:
     position[100:102] = 0.7
     velocity[[300, 900]] = 50.0
     columns = {"time": "t", "position": "x", "velocity": "v"}
-    path = table_of(tmp_path / "log.csv", t=TIME, x=position, v=velocity)
+    path = csv_of(tmp_path / "log.csv", t=TIME, x=position, v=velocity)
     found = read_table(path, columns)
     assert "away and back, as no motion does, in 2 rows, the first is line 102" in found.notes[1]
     assert "as the positions do not, in 2 rows, the first is line 302" in found.notes[2]
     assert np.flatnonzero(~found.samples.is_valid).tolist() == [100, 101]
     assert found.samples.velocity[[300, 900]] == pytest.approx(VELOCITY[[300, 900]], abs=1e-3)
-    path = table_of(tmp_path / "log.csv", t=TIME, x=POSITION, v=1e3 * VELOCITY)
+    path = csv_of(tmp_path / "log.csv", t=TIME, x=POSITION, v=1e3 * VELOCITY)
     found = read_table(path, columns)
     assert "the velocity is 1000 times that of the positions: it is left out" in found.notes
     assert found.velocity_estimated
@@ -109,7 +103,7 @@ def test_what_is_left_out_of_a_table_is_said(tmp_path: Path) -> None:
 
 def test_a_jump_from_which_it_does_not_come_back_is_said(tmp_path: Path) -> None:
     position = POSITION + 0.3 * (TIME >= 1.5)
-    path = table_of(tmp_path / "log.csv", t=TIME, x=position)
+    path = csv_of(tmp_path / "log.csv", t=TIME, x=position)
     found = read_table(path, {"time": "t", "position": "x"})
     sentence = "the position jumps by 300 mm, at line 1502, 1.5 s after the first row, and does not"
     assert found.notes[1].startswith(sentence)
@@ -120,7 +114,7 @@ def test_a_counter_that_wraps_is_refused_with_the_expression_that_unwraps_it(
     tmp_path: Path,
 ) -> None:
     counts = np.round(POSITION / 1e-6) % 16384.0
-    path = table_of(tmp_path / "log.csv", t=TIME, n_um=counts)
+    path = csv_of(tmp_path / "log.csv", t=TIME, n_um=counts)
     for column, unwrapped in (
         ("n_um", "unwrap(n_um, 16384)*1e-06"),
         ("n_um*1e-6", "unwrap(n_um*1e-6, 0.016384)"),

@@ -180,6 +180,14 @@ def messages_packed_small(path: Path) -> Path:
     return bag_of(path, schema(), channel(), packed * 600)
 
 
+def nothing_packed_small(path: Path) -> Path:
+    """Without a checksum it might be anything; as records it would be three million of no size."""
+    packed = ZstdCompressor().compress(bytes(32 << 20))
+    sizes = struct.pack("<QQQI", 0, 0, 32 << 20, 0)
+    bomb = record(Opcode.CHUNK, sizes + text("zstd") + struct.pack("<Q", len(packed)) + packed)
+    return bag_of(path, bomb * 6, SOUND)
+
+
 def profiles_without_end(path: Path) -> Path:
     profiles = text("offered_qos_profiles") + text("[" + "a," * 5_000_000 + "]")
     topic = struct.pack("<HH", 1, 1) + text(STATES) + text("cdr") + text(profiles)
@@ -223,6 +231,7 @@ OTHERS = [
     described(lambda file: file.write_text(REPEATED)),
     definitions_without_end,
     messages_packed_small,
+    nothing_packed_small,
     profiles_without_end,
     *(lambda path, parts=parts: bag_of(path, *parts) for parts in records_of_a_gigabyte()),
 ]

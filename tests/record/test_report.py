@@ -1,6 +1,4 @@
 import pytest
-from mcap.writer import CompressionType
-from rclpy.serialization import serialize_message
 
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.record.codec import pack_reference
@@ -12,21 +10,11 @@ from tests.record.runs import (
     SECOND,
     STAMPS,
     STATES,
-    foreign_file,
-    joint_state,
     motion,
     record,
     state,
     write_bag,
 )
-
-
-def foreign_state(stamp):
-    """Return the same as another program may publish it."""
-    position, velocity = motion(stamp / SECOND)
-    values = [7.0, 0.0, position], [8.0, 20.0, velocity], []
-    names = ["gripper", "belt", "slide"]
-    return serialize_message(joint_state(stamp, *values, names, "machine"))
 
 
 def test_a_bag_with_references_tells_the_following_error_to_the_newest_one(tmp_path):
@@ -134,23 +122,6 @@ def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
         report_of_recording(tmp_path / "bag")
     with pytest.raises(BagError, match="in /b that can be read"):
         report_of_recording(tmp_path / "bag", namespace="/b")
-
-
-def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path):
-    """Joints in another order and among others, no efforts, late log times, other topics."""
-    record(tmp_path / "bag", forces=[])
-    path = tmp_path / "foreign.mcap"
-    with foreign_file(path, compression=CompressionType.ZSTD, chunk_size=10_000) as writer:
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        other = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"")
-        channel = writer.register_channel(STATES, "cdr", schema)
-        noise = writer.register_channel("/noise", "cdr", other)
-        for stamp in STAMPS:
-            late = stamp + 12_345
-            message = foreign_state(stamp) if stamp % 3 else state(stamp)
-            writer.add_message(channel, late, message, late)
-            writer.add_message(noise, late, bytes(12), late)
-    assert report_of_recording(path) == report_of_recording(tmp_path / "bag")
 
 
 def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
