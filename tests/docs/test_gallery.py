@@ -27,8 +27,13 @@ NOTEBOOKS = sorted(path.stem for path in EXAMPLES.glob("notebooks/*.ipynb"))
 QUICK = {"replay_into_a_controller"}
 ELSEWHERE = {"compare_controllers"}  # below
 SMALLER = {
+    "basins": {"3.0, 30": "3.0, 6", "2.5, 30": "2.5, 6"},
+    "custom_friction_law": {"0.6, 21": "0.6, 3"},
     "design_for_a_force_limit": {"(0.015, 0.05)": "0.03"},
+    "encoder_and_actuator": {"3.0, 5.0": "0.5, 1.0", "(1, 2, 4, 8)": "(1, 8)"},
+    "friction_with_memory": {"zeros(4000)": "zeros(1500)", "arange(1600)": "arange(300)"},
     "ramp_through_the_hopf_point": {"RAMP = 2500.0": "RAMP = 250.0", "fastest, 26)": "fastest, 4)"},
+    "stiffer_bristles": {"5.1, 0.5": "4.1, 0.5"},
 }
 """By script: what is computed for fewer values, or for a shorter time, than for its figure."""
 
