@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip_ros.arrays import median, windows
+from stickslip_ros.arrays import median, rms, windows
 from stickslip_ros.samples import ForceColumns
 
 
@@ -38,6 +38,10 @@ def test_windows_have_every_row_and_share_the_overlap(rows: int, overlap: int) -
     assert (len(found) > 1) == (rows > 100_000)
     for before, part in pairwise(found):
         assert before[len(before) - overlap :].tolist() == part[:overlap].tolist()
+
+
+def test_the_root_mean_square() -> None:
+    assert rms(np.array([1.0, -7.0])) == 5.0
 
 
 @pytest.mark.parametrize("values", [[3.0], [1.0, 4.0], [5.0, -1.0, 2.0], [0.1, 0.7, 0.2, 0.4]])
