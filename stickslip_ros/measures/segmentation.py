@@ -55,8 +55,8 @@ _LEAST_RIDE = 1e-3
 """Speed in the rests, in belt speeds, from which the velocity of the belt may be wrong."""
 _MOST_RIDE = 0.06
 """Speed in the rests, in belt speeds, by which the velocity of the belt may be wrong at most."""
-_SAME_PERIOD = 0.01
-"""Relative difference of the periods of the same cycles."""
+_SAME_PERIOD, _SAME_STICK = 0.01, 0.15
+"""Relative difference of the periods, and that of the stick fractions, of the same cycles."""
 _TAIL = 2048
 """Number of last samples in which cycles are looked for first."""
 _GROWTH = 4
@@ -144,7 +144,7 @@ class StickSlip(CycleMeans):
         share, error = self.cycle.stick_fraction, self.errors.stick_fraction
         error = hypot(error, (measures.errors or {}).get("stick_fraction", 0.0))
         same = abs(measures.period / self.cycle.period - 1.0) < _SAME_PERIOD
-        return same and abs(measures.stick_fraction - share) < _SURE * error
+        return same and abs(measures.stick_fraction - share) < min(_SURE * error, _SAME_STICK)
 
 
 def stick_slip(

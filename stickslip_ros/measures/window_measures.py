@@ -65,8 +65,6 @@ _UNLIKE = 0.2
 """Standard error of the mean period, in periods, above which cycles have nothing in common."""
 _RIPPLE = 4.0
 """Range of the middles of cycles beside a line, in amplitudes, above which they are ripples."""
-_HIDDEN_STICK = 0.05
-"""Error of a stick fraction of zero above which a stick may be hidden."""
 _OTHER_SPEED = 0.1
 """Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
@@ -106,9 +104,8 @@ def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | 
     It may be hidden where the slide passes the speed of the belt, and where it turns on a guide at
     rest. It may be none at a speed so far from that of the belt that no calibration errs by it.
     """
-    slips, errors = measures.regime is Regime.PURE_SLIP, measures.errors or {}
-    doubtful = slips and errors.get("stick_fraction", 0.0) > _HIDDEN_STICK
-    doubtful |= slips and _may_rest_where_it_turns(window)
+    slips = measures.regime is Regime.PURE_SLIP
+    doubtful = slips and _may_rest_where_it_turns(window)
     if fit is not None:
         doubtful |= slips and fit.overtakes
         if fit.stick is not None:

@@ -100,7 +100,7 @@ def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: P
 def test_rows_that_only_repeat_a_position_are_left_out(tmp_path: Path, first: int) -> None:
     """A trace is often faster than what it records."""
     shown = np.repeat(POSITION[::4], 4)[: len(TIME)]
-    path = csv_of(tmp_path / "log.csv", **lists(t=TIME[first:], x=shown[first:]))
+    path = csv_of(tmp_path / "log.csv", t=TIME[first:], x=shown[first:])
     recording = read_table(path, {"time": "t", "position": "x"})
     assert recording.samples.position.tolist() == POSITION[4 if first else 0 :: 4].tolist()
     assert set(np.diff(recording.samples.stamp)) == {4_000_000}
