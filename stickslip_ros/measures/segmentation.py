@@ -29,7 +29,7 @@ from stickslip_ros.measures.parabolas import parabolas
 from stickslip_ros.measures.slip_edges import Rest, SlipEdges, edge, slip_edges
 
 _REST_SHARE = 0.5
-"""Speed up to which a slide may rest, in mean speeds."""
+"""Speed up to which a slide may rest, and largest error of one that does, in mean speeds."""
 _FEWEST_REACHES = 16
 """Number of samples, in lengths of a mean, from which rests are looked for."""
 _SURE = 3.0
@@ -53,7 +53,7 @@ _COARSE = 0.05
 rests, unless the mean is one of the fewest samples."""
 _LEAST_RIDE = 1e-3
 """Speed in the rests, in belt speeds, from which the velocity of the belt may be wrong."""
-_MOST_RIDE = 0.06
+_MOST_RIDE = 0.07
 """Speed in the rests, in belt speeds, by which the velocity of the belt may be wrong at most."""
 _SAME_PERIOD, _SAME_STICK = 0.01, 0.15
 """Relative difference of the periods, and that of the stick fractions, of the same cycles."""
@@ -282,7 +282,7 @@ def _measured(
     still = [(before.landing, after.release) for before, after in pairwise(used)]
     creep, creep_error = _creep(time, relative, still, noise, step)
     unit = abs(belt_velocity) or speed
-    if creep_error > _REST_SHARE * unit:  # what is slow may move as all does
+    if creep_error > _REST_SHARE * unit:  # what is slow may not rest
         return None
     return StickSlip(
         cycle=replace(

@@ -1,10 +1,11 @@
 """Edges of a slip: when it leaves one rest and when it lands in the next.
 
 At an edge the distance from the rest grows with a power of time; the edge is where that power
-extrapolates to zero, and what the powers that fit differ by is part of its error.
+extrapolates to zero, and what the powers that fit differ by is part of its error. A long rest that
+creeps, as where positions drift, is a line.
 """
 
-from math import hypot, sqrt
+from math import copysign, hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -29,9 +30,11 @@ _RELEASE_POWERS = np.array([[2.0], [3.0], [4.0], [6.0]])
 leaves a constant force, one that falls with the speed lets the motion grow slowly."""
 _LANDING_POWERS = np.array([[1.5], [2.0], [2.5]])
 """Powers of the time to a landing with which the distance may fall."""
-_LONG, _MOST_CREEP = 0.4, 0.1
-"""Length of a rest that may creep, in the time from the middle of a rest to that of the next: a
-sine is slow for a third of its period; distance by which it creeps, in slips, at most."""
+_LONG, _CREEP_STEPS, _MOST_CREEP = 0.6, 4.0, 0.1
+"""Length of a rest from which it may creep, in the time from its middle to that of the next: a sine
+is slow for a third of its period; least creep, in steps, and largest, as a share of the slip."""
+_BACK = 0.25
+"""Travel of a slip, in its farthest distance from the rest, below which the slide comes back."""
 _ROW_ERROR = 0.3
 """Least standard error of an edge, in sample periods."""
 _SLIP_ERROR = 0.03
@@ -78,12 +81,16 @@ def edge(
     first, last = ((still.first + still.last) // 2 for still in (rest, other))
     way = 1 if last >= first else -1
     rows = np.arange(first, last + way, way)
-    size = abs(other.level - rest.level)
+    away, slip = position[rows] - rest.level, other.level - rest.level
+    farthest = float(away[np.argmax(np.abs(away))])
+    slip = slip if abs(slip) > _BACK * abs(farthest) else farthest
+    size = abs(slip)
     near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
-    long = rest.last - rest.first > _LONG * len(rows)
-    level, creep = _line(position, rest, near, size) if long else (rest.level, 0.0)
-    course = position[rows] - level - creep * (rows - first)
-    course *= 1.0 if other.level > rest.level else -1.0
+    if rest.last - rest.first > _LONG * len(rows):
+        least = max(2.0 * near, _CREEP_STEPS * step)
+        level, creep = _line(position, rest, least, _MOST_CREEP * size)
+        away = position[rows] - level - creep * (rows - first)
+    course = copysign(1.0, slip) * away
     middle = int(np.argmax(course > size / 2.0))
     powers = _RELEASE_POWERS if way > 0 else _LANDING_POWERS
     row, error = _edge(course[: middle + 1], near, size, powers)
@@ -91,16 +98,16 @@ def edge(
     return float(np.interp(row, np.arange(len(rows)), time[rows])), error * period
 
 
-def _line(position: FloatArray, rest: Rest, near: float, size: float) -> tuple[float, float]:
-    """Return where a rest is in its middle, m, and its creep, m a row, if it leads away from there.
+def _line(position: FloatArray, rest: Rest, least: float, most: float) -> tuple[float, float]:
+    """Return where a rest is in its middle, m, and its creep, m a row.
 
-    `near` is the distance from a rest that is none, and `size` that of the slip, m.
+    A creep by less than the `least` travel in the rest, or by more than the `most`, m, is none.
     """
     quarter = (rest.last - rest.first) // 4
     inner = position[rest.first + quarter : rest.last - quarter + 1]
     lag = np.arange(len(inner)) - (len(inner) - 1) / 2.0
     creep = float(lag @ inner) / max(float(lag @ lag), 1.0)
-    if 2.0 * near < abs(creep) * (rest.last - rest.first) < _MOST_CREEP * size:
+    if least < abs(creep) * (rest.last - rest.first) < most:
         return float(inner.mean()), creep
     return rest.level, 0.0
 
@@ -117,8 +124,8 @@ def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> t
     beyond = (distance[last + 1 :] > far).nonzero()[0]
     values = distance[last + 1 : last + 2 + int(beyond[0]) if len(beyond) else None]
     if len(values) < 3:
-        # A distance that grows with the square of time is near the rest for this many rows; the
-        # edge is between half of them and none.
+        # A distance that grows with the square of time is near the rest for this many rows, where
+        # noise or a step hides it: the edge is in their middle, more or less.
         hidden = max(len(values) - 0.5, 0.5) / (sqrt(far / near) - 1.0)
         return last + 0.5 - hidden / 2.0, hypot(_ROW_ERROR, 0.3, hidden / 2.0)
     half = (len(values) - 1) / 2.0

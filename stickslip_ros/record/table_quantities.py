@@ -29,8 +29,9 @@ from stickslip_ros.text import must_be_one_of
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
-_FEWEST_CHANGES = 16
-"""Number of changes of a position from which it is known to be held for several rows."""
+_FEWEST_CHANGES, _MOST_HELD = 16, 20
+"""Number of changes of a position from which it is known to be held for several rows; most of them.
+"""
 
 
 class Quantities(NamedTuple):
@@ -82,9 +83,11 @@ def quantities_of(
     if needed == "position":
         held = _held(values["position"])
         if held.step > 1:
-            rows, values = rows[held], {name: value[held] for name, value in values.items()}
+            own = np.full(len(time), nan)
+            own[held] = values["position"][held]
+            values["position"] = own
             cells.notes.append(
-                f"the position changes in every {held.step} rows only: those between are left out"
+                f"the position changes only every {held.step} rows: those between are left out"
             )
         return Quantities(values, [*cells.notes, *without_faults(cells, values, rows)])
     at, velocity = values["time"][present], values["velocity"][present]
@@ -100,11 +103,12 @@ def _held(position: FloatArray) -> slice:
 
     All changes are a multiple of the same number of rows apart.
     """
-    changed = np.flatnonzero(np.diff(position) != 0.0) + 1
-    if len(changed) <= _FEWEST_CHANGES:
-        return slice(0, None, 1)
-    held = int(np.gcd.reduce(np.diff(changed)))
-    return slice(int(changed[0]) % held, None, held)
+    known = np.flatnonzero(np.isfinite(position))
+    changed = known[1:][np.diff(position[known]) != 0.0]
+    held = int(np.gcd.reduce(np.diff(changed))) if len(changed) >= _FEWEST_CHANGES else 1
+    return (
+        slice(int(changed[0]) % held, None, held) if 1 < held <= _MOST_HELD else slice(0, None, 1)
+    )
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:

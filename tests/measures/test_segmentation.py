@@ -71,6 +71,17 @@ def test_rests_by_turns_and_stamps_that_are_uneven_change_little(
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
 
 
+@pytest.mark.parametrize("belt", [0.0, TRAVEL / PERIOD])
+def test_a_push_within_a_rest_that_comes_back_leaves_the_cycles(belt: float) -> None:
+    time = 1e-9 * STAMPS
+    push = 0.15 * TRAVEL * np.sin(np.pi * np.clip((time % PERIOD - 0.45) / 0.02, 0.0, 1.0)) ** 2
+    position = np.round((stairs(time) + push) / 1e-5) * 1e-5 + belt * time
+    found = stick_slip(time, position, belt, 20, 1e-5)
+    assert found is not None
+    assert found.cycle.period == pytest.approx(PERIOD, rel=0.01)
+    assert found.cycle.stick_fraction == pytest.approx(1.0 - (SLIP + 0.02) / PERIOD, abs=0.03)
+
+
 @pytest.mark.parametrize("share", [0.005, -0.02])
 def test_a_drift_that_ends_leaves_the_rests(share: float) -> None:
     """Of this share of the feed at the start: no belt velocity suits all rests."""
