@@ -30,9 +30,10 @@ _RELEASE_POWERS = np.array([[2.0], [3.0], [4.0], [6.0]])
 leaves a constant force, one that falls with the speed lets the motion grow slowly."""
 _LANDING_POWERS = np.array([[1.5], [2.0], [2.5]])
 """Powers of the time to a landing with which the distance may fall."""
-_LONG, _CREEP_STEPS, _MOST_CREEP = 0.6, 4.0, 0.1
+_LONG, _MARGIN, _MOST_CREEP = 0.6, 0.15, 0.1
 """Length of a rest from which it may creep, in the time from its middle to that of the next: a sine
-is slow for a third of its period; least creep, in steps, and largest, as a share of the slip."""
+is slow for a third of its period; share of it at its ends that may be bent; largest creep, in
+slips. Of a single step in such a rest the line is nowhere more than what is none away."""
 _BACK = 0.25
 """Travel of a slip, in its farthest distance from the rest, below which the slide comes back."""
 _ROW_ERROR = 0.3
@@ -87,8 +88,7 @@ def edge(
     size = abs(slip)
     near = max(_NEAR_STEPS * step, _NEAR_NOISES * noise, _NEAR_SHARE * size)
     if rest.last - rest.first > _LONG * len(rows):
-        least = max(2.0 * near, _CREEP_STEPS * step)
-        level, creep = _line(position, rest, least, _MOST_CREEP * size)
+        level, creep = _line(position, rest, near, _MOST_CREEP * size)
         away = position[rows] - level - creep * (rows - first)
     course = copysign(1.0, slip) * away
     middle = int(np.argmax(course > size / 2.0))
@@ -103,8 +103,8 @@ def _line(position: FloatArray, rest: Rest, least: float, most: float) -> tuple[
 
     A creep by less than the `least` travel in the rest, or by more than the `most`, m, is none.
     """
-    quarter = (rest.last - rest.first) // 4
-    inner = position[rest.first + quarter : rest.last - quarter + 1]
+    margin = round(_MARGIN * (rest.last - rest.first))
+    inner = position[rest.first + margin : rest.last - margin + 1]
     lag = np.arange(len(inner)) - (len(inner) - 1) / 2.0
     creep = float(lag @ inner) / max(float(lag @ lag), 1.0)
     if least < abs(creep) * (rest.last - rest.first) < most:

@@ -94,6 +94,17 @@ def test_a_drift_that_ends_leaves_the_rests(share: float) -> None:
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.03)
 
 
+@pytest.mark.parametrize("drift", [0.005, -0.01, 0.02])
+@pytest.mark.parametrize("steps", [50, 200])
+def test_a_rest_in_which_the_encoder_steps_once_is_a_single_one(drift: float, steps: int) -> None:
+    time = 1e-9 * STAMPS
+    position = stairs(time) + drift * TRAVEL / PERIOD * time
+    step = TRAVEL / steps
+    found = stick_slip(time, np.round(position / step) * step, 0.0, 20, step)
+    assert found is not None
+    assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.06)
+
+
 @pytest.mark.parametrize("samples", [24, 32, 48])
 def test_slips_of_few_samples_under_noise_have_their_errors(samples: int) -> None:
     """What is hidden in the noise of a slip is part of its duration."""
