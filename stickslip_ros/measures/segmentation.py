@@ -29,7 +29,8 @@ from stickslip_ros.measures.parabolas import parabolas
 from stickslip_ros.measures.slip_edges import Rest, SlipEdges, edge, slip_edges
 
 _REST_SHARE = 0.5
-"""Speed up to which a slide may rest, and largest error of one that does, in mean speeds."""
+"""Speed up to which a slide may rest, and error of the speed in rests up to which they may be some,
+in mean speeds."""
 _FEWEST_REACHES = 16
 """Number of samples, in lengths of a mean, from which rests are looked for."""
 _SURE = 3.0
@@ -282,7 +283,7 @@ def _measured(
     still = [(before.landing, after.release) for before, after in pairwise(used)]
     creep, creep_error = _creep(time, relative, still, noise, step)
     unit = abs(belt_velocity) or speed
-    if creep_error > _REST_SHARE * unit:  # what is slow may not rest
+    if creep_error > _REST_SHARE * unit:
         return None
     return StickSlip(
         cycle=replace(

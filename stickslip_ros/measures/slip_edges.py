@@ -31,9 +31,9 @@ leaves a constant force, one that falls with the speed lets the motion grow slow
 _LANDING_POWERS = np.array([[1.5], [2.0], [2.5]])
 """Powers of the time to a landing with which the distance may fall."""
 _LONG, _MARGIN, _MOST_CREEP = 0.6, 0.15, 0.1
-"""Length of a rest from which it may creep, in the time from its middle to that of the next: a sine
-is slow for a third of its period; share of it at its ends that may be bent; largest creep, in
-slips. Of a single step in such a rest the line is nowhere more than what is none away."""
+"""Length of a rest from which it may creep, in the time from its middle to that of the next (a sine
+is slow for a third of its period); share of it at each end that may be bent and does not count for
+its creep; largest creep, in slips."""
 _BACK = 0.25
 """Travel of a slip, in its farthest distance from the rest, below which the slide comes back."""
 _ROW_ERROR = 0.3

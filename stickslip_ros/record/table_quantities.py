@@ -30,8 +30,7 @@ _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
 _FEWEST_CHANGES, _MOST_HELD = 16, 20
-"""Number of changes of a position from which it is known to be held for several rows; most of them.
-"""
+"""Number of changes of a position from which it is known to be held; most rows for which it is."""
 
 
 class Quantities(NamedTuple):
@@ -105,10 +104,11 @@ def _held(position: FloatArray) -> slice:
     """
     known = np.flatnonzero(np.isfinite(position))
     changed = known[1:][np.diff(position[known]) != 0.0]
-    held = int(np.gcd.reduce(np.diff(changed))) if len(changed) >= _FEWEST_CHANGES else 1
-    return (
-        slice(int(changed[0]) % held, None, held) if 1 < held <= _MOST_HELD else slice(0, None, 1)
-    )
+    if len(changed) < _FEWEST_CHANGES:
+        return slice(0, None, 1)
+    held = int(np.gcd.reduce(np.diff(changed)))
+    held = held if held <= _MOST_HELD else 1
+    return slice(int(changed[0]) % held, None, held)
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
