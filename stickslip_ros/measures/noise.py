@@ -24,8 +24,8 @@ FEW_SAMPLES, LEAST_SAMPLES = 10.0, 4.0
 FEWEST_SAMPLES = 32
 """Number of samples from which the noise is estimated."""
 PRECISION, ROUNDING = 1e-12, 1e-8
-"""Noise below this share of the largest values is rounding of the numbers, not of a sensor; the
-rounding of numbers in tables, likewise."""
+"""Noise below this share of the largest values is rounding of the numbers, not of a sensor; below
+this one, that of numbers in tables, as of a difference of columns with nine digits."""
 NOISE_SHARE = 1e-7
 """Noise below this share of the motion is rounding, or an imperfection of the estimate."""
 NOISE_SAMPLES = 4096

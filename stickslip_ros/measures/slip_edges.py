@@ -124,8 +124,8 @@ def _edge(course: FloatArray, near: float, size: float, powers: FloatArray) -> t
     beyond = (distance[last + 1 :] > far).nonzero()[0]
     values = distance[last + 1 : last + 2 + int(beyond[0]) if len(beyond) else None]
     if len(values) < 3:
-        # A distance that grows with the square of time is near the rest for this many rows, where
-        # noise or a step hides it: the edge is in their middle, more or less.
+        # For so many rows noise or a step hides a distance that grows with the square of time. The
+        # edge is put in their middle, with half of them as its error.
         hidden = max(len(values) - 0.5, 0.5) / (sqrt(far / near) - 1.0)
         return last + 0.5 - hidden / 2.0, hypot(_ROW_ERROR, 0.3, hidden / 2.0)
     half = (len(values) - 1) / 2.0
