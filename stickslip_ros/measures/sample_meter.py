@@ -260,8 +260,10 @@ class SampleMeter:
         # of a belt.
         may_rest = self.reading.noisy is None or self._speeds.belt == 0.0
         rests = rests_and_slips(window, self._known) if may_rest else None
-        if rests is not None and rests.rests and not rests.agrees(measures):
-            return segmented_measures(window, rests)
+        if rests is not None and not rests.passes and not rests.agrees(measures):
+            sticks = measures.stick_fraction and rests.same_period(measures)
+            if rests.rests or not sticks:
+                return segmented_measures(window, rests)
         if measures.errors is not None and measures.stick_fraction:
             error = max(measures.errors["stick_fraction"], _EDGE_ERROR / self._per_cycle)
             measures = replace(measures, errors={**measures.errors, "stick_fraction": error})

@@ -58,6 +58,8 @@ _MOST_RIDE = 0.07
 """Speed in the rests, in belt speeds, by which the velocity of the belt may be wrong at most."""
 _SAME_PERIOD, _SAME_STICK = 0.01, 0.15
 """Relative difference of the periods, and that of the stick fractions, of the same cycles."""
+_MOST_ERROR = 0.08
+"""Error of a stick fraction up to which it tells whether another one agrees."""
 _TAIL = 2048
 """Number of last samples in which cycles are looked for first."""
 _GROWTH = 4
@@ -140,12 +142,16 @@ class StickSlip(CycleMeans):
 
     def agrees(self, measures: Measures) -> bool:
         """Return whether measures that were found otherwise are those of the same cycles."""
-        if measures.stick_fraction is None or not measures.period:
-            return False
         share, error = self.cycle.stick_fraction, self.errors.stick_fraction
+        if measures.stick_fraction is None or error > _MOST_ERROR or not self.same_period(measures):
+            return False
         error = hypot(error, (measures.errors or {}).get("stick_fraction", 0.0))
-        same = abs(measures.period / self.cycle.period - 1.0) < _SAME_PERIOD
-        return same and abs(measures.stick_fraction - share) < min(_SURE * error, _SAME_STICK)
+        return abs(measures.stick_fraction - share) < min(_SURE * error, _SAME_STICK)
+
+    def same_period(self, measures: Measures) -> bool:
+        """Return whether cycles that were found otherwise have this period."""
+        period = measures.period
+        return period is not None and abs(period / self.cycle.period - 1.0) < _SAME_PERIOD
 
 
 def stick_slip(

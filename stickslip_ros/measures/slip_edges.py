@@ -91,11 +91,14 @@ def edge(
         level, creep = _line(position, rest, near, _MOST_CREEP * size)
         away = position[rows] - level - creep * (rows - first)
     course = copysign(1.0, slip) * away
+    # Where the slide leaves the level of a rest amid it, any such row may be its edge.
+    inner = course[: round((0.5 - _MARGIN) * abs(rest.last - rest.first))]
+    unsure = int(np.count_nonzero(np.abs(inner) > near)) / sqrt(12.0)
     middle = int(np.argmax(course > size / 2.0))
     powers = _RELEASE_POWERS if way > 0 else _LANDING_POWERS
     row, error = _edge(course[: middle + 1], near, size, powers)
     period = abs(float(time[last] - time[first])) / max(abs(last - first), 1)
-    return float(np.interp(row, np.arange(len(rows)), time[rows])), error * period
+    return float(np.interp(row, np.arange(len(rows)), time[rows])), hypot(error, unsure) * period
 
 
 def _line(position: FloatArray, rest: Rest, least: float, most: float) -> tuple[float, float]:

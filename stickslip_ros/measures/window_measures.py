@@ -94,8 +94,7 @@ def measure(
         refined, fit = _by_reversals(window, reading, quick=quick)
         if segmented.agrees(refined):
             return _undecided_if_doubtful(window, _not_surer(refined, segmented), fit), fit
-    measures = segmented_measures(window, segmented)
-    return measures if segmented.rests else undecided(measures), None
+    return segmented_measures(window, segmented), None
 
 
 def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
@@ -174,8 +173,9 @@ def _may_rest_where_it_turns(window: Window) -> bool:
 
 
 def segmented_measures(window: Window, segmented: StickSlip) -> Measures:
-    """Return the measures of rests and slips."""
-    return segmented.measures(False, *_trend(window, segmented.amplitudes))
+    """Return the measures of rests and slips, undecided where the rests are not sure."""
+    measures = segmented.measures(False, *_trend(window, segmented.amplitudes))
+    return measures if segmented.rests else undecided(measures)
 
 
 def other_guide(window: Window, reading: SampleAssumptions) -> tuple[float, float] | None:

@@ -105,6 +105,22 @@ def test_a_rest_in_which_the_encoder_steps_once_is_a_single_one(drift: float, st
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.06)
 
 
+@pytest.mark.parametrize("creep", [0.03, 0.05, 0.09])
+def test_a_contact_that_creeps_before_it_slips_has_no_false_stick_fraction(creep: float) -> None:
+    """In the second half of a rest the slide creeps, faster and faster."""
+    time, rest = 1e-9 * STAMPS, 1.0 - SLIP / PERIOD
+    second_half = np.clip(2.0 * (time % PERIOD - SLIP) / (PERIOD - SLIP) - 1.0, 0.0, 1.0)
+    position = stairs(time) + creep * TRAVEL * (np.floor(time / PERIOD) + second_half**2)
+    feed = (1.0 + creep) * TRAVEL / PERIOD
+    meter = fed(columns(STAMPS, feed * time - position, belt_velocity=1.02 * feed), UNKNOWN)
+    measures = meter.measures()
+    if measures.regime is not None:
+        assert measures.errors is not None
+        assert measures.stick_fraction is not None
+        margin = 3.0 * measures.errors["stick_fraction"]
+        assert rest / 2.0 - margin < measures.stick_fraction < rest + margin
+
+
 @pytest.mark.parametrize("samples", [24, 32, 48])
 def test_slips_of_few_samples_under_noise_have_their_errors(samples: int) -> None:
     """What is hidden in the noise of a slip is part of its duration."""
