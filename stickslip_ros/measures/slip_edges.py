@@ -91,7 +91,7 @@ def edge(
         level, creep = _line(position, rest, near, _MOST_CREEP * size)
         away = position[rows] - level - creep * (rows - first)
     course = copysign(1.0, slip) * away
-    # Where the slide leaves the level of a rest amid it, any such row may be its edge.
+    # Where the middle of a rest leaves its level, any such row may be the edge.
     inner = course[: round((0.5 - _MARGIN) * abs(rest.last - rest.first))]
     unsure = int(np.count_nonzero(np.abs(inner) > near)) / sqrt(12.0)
     middle = int(np.argmax(course > size / 2.0))
