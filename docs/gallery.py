@@ -34,15 +34,11 @@ def notebooks() -> list[Path]:
 
 
 def executed(path: Path) -> nbformat.NotebookNode:
-    """Return a notebook with its outputs, the figures in them small."""
+    """Return a notebook with its outputs."""
     notebook = nbformat.read(path, as_version=4)
     resources = {"metadata": {"path": str(path.parent)}}
     client = NotebookClient(notebook, timeout=300, resources=resources, record_timing=False)
-    found = client.execute()
-    for data in results_in(found):
-        if "image/png" in data:
-            data["image/png"] = b64encode(small(b64decode(data["image/png"]))).decode()
-    return found
+    return client.execute()
 
 
 def results_in(notebook: nbformat.NotebookNode) -> list[dict[str, str]]:
@@ -76,9 +72,11 @@ def main(names: list[str]) -> None:
         print(path.stem, flush=True)
         if path.suffix == ".ipynb":
             notebook = executed(path)
+            with_figure = [data for data in results_in(notebook) if "image/png" in data]
+            for data in with_figure:
+                data["image/png"] = b64encode(small(b64decode(data["image/png"]))).decode()
             nbformat.write(notebook, path)
-            figures = [data["image/png"] for data in results_in(notebook) if "image/png" in data]
-            (GALLERY / f"{path.stem}.png").write_bytes(b64decode(figures[-1]))
+            (GALLERY / f"{path.stem}.png").write_bytes(b64decode(with_figure[-1]["image/png"]))
             continue
         with TemporaryDirectory() as folder:
             subprocess.run([sys.executable, path, folder], check=True)
