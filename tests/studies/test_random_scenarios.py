@@ -7,16 +7,16 @@ from typing import Any
 import pytest
 
 from benchmarks import random_scenarios as benchmark
-from tests.studies.random_scenarios import CHANGES, LAWS, differences
+from tests.studies.random_scenarios import CHANGES, differences
 
 FOUND: dict[str, Any] = json.loads(
     (Path(benchmark.__file__).parent / "random_scenarios.json").read_text(encoding="utf-8")
 )
 
 
+# One of each law; of LuGre friction seed 5 takes five times as long as seed 12.
 @pytest.mark.parametrize(
-    "seed",
-    [*range(2), *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, len(LAWS)))],
+    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3, 4, 12, 6))]
 )
 def test_no_change_alters_what_it_should_not(seed: int) -> None:
     assert {name: differences(seed, name) for name in CHANGES} == {name: [] for name in CHANGES}
