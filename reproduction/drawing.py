@@ -24,13 +24,11 @@ from reproduction.figures import (
 )
 from stickslip_ros.files import written
 from stickslip_ros.measures.breakpoints import Breakpoints
+from stickslip_ros.show import BLUE, GREEN, ORANGE
 from stickslip_ros.show.quantities import GREEK, Units
+from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
 from stickslip_ros.show.style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    REGIMES,
     SCREEN,
     FigureStyle,
     finish,

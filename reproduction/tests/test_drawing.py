@@ -19,7 +19,8 @@ from reproduction.figures import (
 )
 from reproduction.tests.test_figures import over_belt_speed
 from stickslip_ros.model.friction import Linear
-from stickslip_ros.show.style import BLUE, GREEN, ORANGE, STYLES
+from stickslip_ros.show import BLUE, GREEN, ORANGE
+from stickslip_ros.show.style import STYLES
 from tests.drives import PAPER
 from tests.show.texts import faults, in_styles, legend_texts
 

@@ -19,9 +19,9 @@ from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.show import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY_BLUE
 from stickslip_ros.show.quantities import Units
+from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.show.style import (
     DASHES,
-    REGIMES,
     SCREEN,
     FigureStyle,
     finish,

@@ -21,14 +21,13 @@ from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.show import AMBER, GREY, INK, LIGHT_GREY, PURPLE, SKY_BLUE, YELLOW
 from stickslip_ros.show.drawing import label_axis
 from stickslip_ros.show.quantities import MEASURES, Units, check_colour
+from stickslip_ros.show.regimes import REGIMES, Look
 from stickslip_ros.show.study_tables import attractor_name
 from stickslip_ros.show.style import (
     DASHES,
     MANY,
-    REGIMES,
     SCREEN,
     FigureStyle,
-    Look,
     finish,
     styled,
     title_of,

@@ -1,8 +1,8 @@
-"""Common style of the figures: lines, fonts, colours and regimes, and how figures are saved."""
+"""Common style of the figures: lines, fonts and sizes, and how figures are saved."""
 
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from io import BytesIO
@@ -10,7 +10,7 @@ from itertools import accumulate
 from logging import ERROR, getLogger
 from pathlib import Path
 from textwrap import fill
-from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -24,36 +24,8 @@ from matplotlib.ticker import AutoLocator
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.files import written
-from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.show import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE, SKY_BLUE, YELLOW
 from stickslip_ros.text import printable, shown
-
-
-class Look(NamedTuple):
-    """Colour and label of a regime, with marker and hatch to distinguish it without colour."""
-
-    colour: str
-    label: str
-    marker: str
-    hatch: str
-    """Hatch pattern, drawn in `INK`."""
-
-
-REGIMES: Mapping[Regime | None, Look] = {
-    regime: Look(colour, Regime.label(regime), marker, hatch)
-    for regime, colour, marker, hatch in (
-        (Regime.STICK_SLIP, ORANGE, "o", ""),
-        (Regime.PURE_SLIP, BLUE, "^", "..."),
-        (Regime.EQUILIBRIUM, GREEN, "s", "///"),
-        (Regime.HELD, SKY_BLUE, "v", "---"),
-        (Regime.STUCK, GREY, "D", "xxx"),
-        (Regime.UNBOUNDED, "black", "X", ""),
-        (Regime.UNDERSAMPLED, YELLOW, "p", "+++"),
-        (None, LIGHT_GREY, "P", "\\\\\\"),
-    )
-}
-"""Look by regime; None is for a motion without one."""
 
 DASHES = ("--", ":", "-.")
 """Line styles of markers, in turn, so that colour is not the only distinction."""

@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from scipy.optimize import bisect
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
@@ -108,6 +107,7 @@ def stable_feeds(
     `LinearSampledLoop.from_drive` takes. None if the belt is at rest, or if linear theory does not
     cover the loop.
     """
+    from scipy.optimize import bisect  # takes long to import
 
     def is_stable(speed: float) -> bool:
         moved = replace(drive, belt_speed=speed)

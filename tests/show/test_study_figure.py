@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.show import BLUE, GREEN, LIGHT_GREY, ORANGE
+from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.show.study_figure import basin_figure, diagram_figure, map_figure
-from stickslip_ros.show.style import BLUE, GREEN, LIGHT_GREY, ORANGE, REGIMES, STYLES
+from stickslip_ros.show.style import STYLES
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid, Plan, RandomSample

@@ -2,13 +2,18 @@
 
 import argparse
 import os
+import socket
 from contextlib import suppress
 from pathlib import Path
 
 from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of, whole
-from stickslip_ros.app.optional_dependencies import check_dashboard, load_matplotlib, loading_ros
+from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.text import printable
+
+HOST = "127.0.0.1"
+"""Address of the page: loopback only."""
 
 DEFAULT_PORT = 8642
 """First port that is tried by default."""
@@ -50,8 +55,22 @@ def run(arguments: argparse.Namespace) -> None:
     die_with_parent()
     with suppress(OSError):
         os.nice(10)  # the simulation has priority
-    load_matplotlib()
+    listening = _listen(arguments.port)
+    os.environ["MATPLOTLIB"] = "false"  # NiceGUI would import it
     from stickslip_ros.app.dashboard.server import serve  # needs NiceGUI and takes seconds
 
     readable = {*arguments.read, *(str(Path(path).resolve()) for path in arguments.read)}
-    serve(namespace, arguments.port, reach, readable, printable(arguments.command))
+    serve(namespace, listening, reach, readable, printable(arguments.command))
+
+
+def _listen(port: int | None) -> socket.socket:
+    """Return a socket that listens at the port, or at the first free one from the default on."""
+    ports = range(DEFAULT_PORT, LARGEST_PORT + 1) if port is None else [port]
+    reason = ""
+    for number in ports:
+        try:
+            return socket.create_server((HOST, number))
+        except OSError as error:
+            reason = error.strerror
+    tried = f"--port {port}" if port is not None else f"every port from {ports[0]} to {ports[-1]}"
+    raise InvalidInputError(f"{tried}: {reason}")

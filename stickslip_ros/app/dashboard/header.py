@@ -11,7 +11,7 @@ from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.run_state import ABSENT, SILENT
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.show import GREY
-from stickslip_ros.show.style import REGIMES
+from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.text import number_in
 
 

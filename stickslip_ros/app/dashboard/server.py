@@ -20,17 +20,14 @@ from jinja2 import DictLoader
 from nicegui import client, core, ui
 from rclpy.task import Future
 
-from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
+from stickslip_ros.app.dashboard import HOST
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import Pages
 from stickslip_ros.app.dashboard.run_state import RunState
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.process import ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, spin
 from stickslip_ros.text import printable
-
-_HOST = "127.0.0.1"
 
 _RECONNECT_TIME = 30.0
 """Time, s, for which a page without connection is kept; then it is loaded again.
@@ -51,15 +48,17 @@ _LONGEST_LINE = 300
 
 
 def serve(
-    namespace: str, port: int | None, reach: str, readable: Collection[str], command: str
+    namespace: str,
+    listening: socket.socket,
+    reach: str,
+    readable: Collection[str],
+    command: str,
 ) -> None:
-    """Serve the page of a namespace until SIGINT or SIGTERM.
+    """Serve the page of a namespace on a socket that listens, until SIGINT or SIGTERM.
 
     `reach` describes which nodes can be heard; of the paths that they name, those that are
     `readable` are read. The `command` that started the run is shown; empty if it is not known.
-    Raises InvalidInputError for a port in use.
     """
-    listening = _listen(port)
     signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on when it ends
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _exit)
@@ -106,7 +105,7 @@ class _Server(uvicorn.Server):
 
 def _keep_others_out(app: FastAPI) -> None:
     """Keep others from controlling the drive: by host name, frame, or script, also in a text."""
-    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     core.sio.eio.cors_allowed_origins = None  # the page's own origin only
     # In the template, before there is any text of others: the scripts of NiceGUI, and no other.
     template = client.templates.get_template("index.html")
@@ -128,19 +127,6 @@ def _keep_others_out(app: FastAPI) -> None:
 
 def _exit(*_: object) -> None:
     sys.exit(0)
-
-
-def _listen(port: int | None) -> socket.socket:
-    """Return a socket that listens at the port, or at the first free one from the default on."""
-    ports = range(DEFAULT_PORT, LARGEST_PORT + 1) if port is None else [port]
-    reason = ""
-    for number in ports:
-        try:
-            return socket.create_server((_HOST, number))
-        except OSError as error:
-            reason = error.strerror
-    tried = f"--port {port}" if port is not None else f"every port from {ports[0]} to {ports[-1]}"
-    raise InvalidInputError(f"{tried}: {reason}")
 
 
 @contextmanager
