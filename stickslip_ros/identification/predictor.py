@@ -5,7 +5,7 @@ from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
-from math import copysign, expm1, nan
+from math import copysign, expm1
 from typing import Any, Self
 
 import numpy as np
@@ -137,12 +137,10 @@ class Predictor:
             length = part.stop - part.start
             outputs = np.full((count, length), np.nan)
             by = np.zeros((length, *(varied.derivatives.shape if varied else (count, 0))))
-            acting, held = nan, chain(((),), forces[part.start : part.stop - 1])
+            held = chain(((),), forces[part.start : part.stop - 1])
             for number, changes in enumerate(held):  # what is done for each sample takes most time
                 for force, duration in zip(changes, durations, strict=False):
-                    if force != acting:
-                        motion.force = acting = force
-                    motion.advance(duration)
+                    motion.advance_under(force, 0.0, duration)
                 if motion.unbounded:
                     break
                 outputs[0, number] = motion.position

@@ -198,8 +198,10 @@ class DriveSystem(DimensionlessDrive):
             return None
         speed, memory = self._relative_speed(mode, instant), self._memory(instant)
         margins = self.drive.friction.margins(speed, mode.switches[SIGN], memory, switches)
-        below = (number for number, margin in enumerate(margins) if margin <= -HYSTERESIS / 2.0)
-        return next(below, None)
+        for number, margin in enumerate(margins):
+            if margin <= -HYSTERESIS / 2.0:
+                return number
+        return None
 
     def is_unbounded(self, instant: Instant) -> bool:
         """Return whether the slide is faster than `UNBOUNDED_SPEED`."""

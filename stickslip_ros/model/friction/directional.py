@@ -22,9 +22,10 @@ def _of_direction(method: Callable[..., Any]) -> Any:
 
     @wraps(method, updated=())
     def ask(self: "Directional", *arguments: Any, **named: Any) -> Any:
-        arguments = (*arguments, *(named[name] for name in parameters[len(arguments) :]))
+        if named:
+            arguments = (*arguments, *(named[name] for name in parameters[len(arguments) :]))
         sign = arguments[place]
-        if isinstance(sign, int | float):
+        if isinstance(sign, (int, float)):
             law = self.forward if sign > 0.0 else self.reverse
             return getattr(law, name)(*arguments)
         ahead, back = (getattr(law, name)(*arguments) for law in (self.forward, self.reverse))
