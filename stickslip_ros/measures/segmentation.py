@@ -59,7 +59,7 @@ _MOST_RIDE = 0.07
 _SAME_PERIOD, _SAME_STICK = 0.01, 0.15
 """Relative difference of the periods, and that of the stick fractions, of the same cycles."""
 _MOST_ERROR = 0.08
-"""Error of a stick fraction up to which it tells whether another one agrees."""
+"""Error of a stick fraction up to which it tells how fast rests move, and whether another agrees."""
 _TAIL = 2048
 """Number of last samples in which cycles are looked for first."""
 _GROWTH = 4
@@ -132,7 +132,8 @@ class StickSlip(CycleMeans):
     @property
     def passes(self) -> bool:
         """Whether the slide is known to move on in what looks like rests."""
-        return abs(self.creep) > max(_CREEP, _PASSING * self.creep_error)
+        moves_on = abs(self.creep) > max(_CREEP, _PASSING * self.creep_error)
+        return moves_on and self.errors.stick_fraction <= _MOST_ERROR
 
     @property
     def rides(self) -> bool:
