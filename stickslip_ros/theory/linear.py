@@ -241,27 +241,22 @@ def _tensors(system: DriveSystem, states: FloatArray, parameters: FloatArray) ->
     the states and then the belt speed.
     """
     places, compiled = system.shared("tensors", lambda: _compiled_tensors(system))
-    order, points = states.shape
-    tensors = [np.zeros((order, *[order + 1] * number, points)) for number in _ORDERS]
-    for (component, *axes), value in zip(
-        places, evaluated(compiled, states, parameters), strict=True
-    ):
-        for permuted in set(permutations(axes)):
-            tensors[len(axes) - 1][component, *permuted] = value
-    return tensors
+    values = evaluated(compiled, states, parameters)
+    return [values[rows] for rows in places]
 
 
-def _compiled_tensors(system: DriveSystem) -> tuple[list[tuple[int, ...]], Any]:
-    """Return places in the tensors, and a compiled function of the values there."""
+def _compiled_tensors(system: DriveSystem) -> tuple[list[npt.NDArray[np.intp]], Any]:
+    """Return a compiled function of the derivatives, and by order the tensor of rows in it."""
     by = [*system.variables, hy.par[system.index["belt_speed"]]]
     rates = list(system.shared_flow(SLIP).rates)
     tensors = hy.diff_tensors(rates, diff_args=by, diff_order=_ORDERS[-1])
-    places: list[tuple[int, ...]] = []
+    places = [np.zeros((len(rates), *[len(by)] * order), np.intp) for order in _ORDERS]
     expressions: list[Any] = []
-    for order in _ORDERS:
+    for order, rows in zip(_ORDERS, places, strict=True):
         for (component, *powers), expression in tensors.get_derivatives(order):
             axes = [axis for axis, power in enumerate(powers) for _ in range(power)]
-            places.append((component, *axes))
+            for permuted in set(permutations(axes)):
+                rows[component, *permuted] = len(expressions)
             expressions.append(expression)
     return places, compiled_function(expressions, list(system.variables))
 
