@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import betaincinv
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario
@@ -33,6 +32,8 @@ def held_interval(held: int, cases: int) -> tuple[float, float]:
 
     Source: Clopper and Pearson, Biometrika 26, 1934.
     """
+    from scipy.special import betaincinv  # takes long to import
+
     ends = betaincinv([held, held + 1], [cases - held + 1, cases - held], [0.025, 0.975])
     low, high = np.where(np.isnan(ends), [0.0, 1.0], ends).tolist()  # of all cases, or none
     return low, high
