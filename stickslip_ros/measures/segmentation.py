@@ -59,7 +59,7 @@ _MOST_RIDE = 0.07
 _SAME_PERIOD, _SAME_STICK = 0.01, 0.15
 """Relative difference of the periods, and that of the stick fractions, of the same cycles."""
 _MOST_ERROR = 0.08
-"""Error of a stick fraction up to which it tells how fast rests move, and whether another agrees."""
+"""Error of a stick fraction up to which it tells how rests move, and whether another agrees."""
 _TAIL = 2048
 """Number of last samples in which cycles are looked for first."""
 _GROWTH = 4

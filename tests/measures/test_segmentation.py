@@ -106,11 +106,15 @@ def test_a_rest_in_which_the_encoder_steps_once_is_a_single_one(drift: float, st
 
 
 @pytest.mark.parametrize("creep", [0.03, 0.05, 0.09])
-def test_a_contact_that_creeps_before_it_slips_has_no_false_stick_fraction(creep: float) -> None:
+@pytest.mark.parametrize(("over", "uneven"), [(0.0, 0.0), (0.3, 0.2)])
+def test_a_contact_that_creeps_before_it_slips_has_no_false_stick_fraction(
+    creep: float, over: float, uneven: float
+) -> None:
     """In the second half of a rest the slide creeps, faster and faster."""
     time, rest = 1e-9 * STAMPS, 1.0 - SLIP / PERIOD
     second_half = np.clip(2.0 * (time % PERIOD - SLIP) / (PERIOD - SLIP) - 1.0, 0.0, 1.0)
-    position = stairs(time) + creep * TRAVEL * (np.floor(time / PERIOD) + second_half**2)
+    position = stairs(time, over, uneven)
+    position += creep * TRAVEL * (np.floor(time / PERIOD) + second_half**2)
     feed = (1.0 + creep) * TRAVEL / PERIOD
     meter = fed(columns(STAMPS, feed * time - position, belt_velocity=1.02 * feed), UNKNOWN)
     measures = meter.measures()
