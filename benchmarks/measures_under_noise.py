@@ -22,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,8 @@ def tried(case: Case, seed: int) -> Trial:
     errors, standard = [], []
     for name in MEASURES:
         value, true = getattr(found, name), getattr(truth, name)
-        errors.append(float("nan") if value is None else value - true)
-        standard.append(float("nan") if found.errors is None else found.errors[name])
+        errors.append(nan if value is None else value - true)
+        standard.append((found.errors or {}).get(name, nan))
     # The amplitude of the last 20 cycles changes by 1 % and one step of the encoder.
     change = 1.02 * max(0.01, case.resolution / truth.amplitude)
     course = (np.arange(_LONGEST) - _LONGEST) * _PERIOD / (WINDOW * truth.period)
@@ -171,10 +172,9 @@ def sticking(ratio: float, exponent: float, told: float, seeds: int) -> dict[str
         for resolution in RESOLUTIONS:
             case = Case(_BELT_SPEED, resolution, 0.0)
             found = measured(case, seed, part, np.zeros(_LONGEST), _BELT_SPEED * (1.0 + told))
-            errors.append(float("nan") if found.errors is None else found.stick_fraction - true)
-            standard.append(
-                float("nan") if found.errors is None else found.errors["stick_fraction"]
-            )
+            error = (found.errors or {}).get("stick_fraction")  # none where it is null
+            errors.append(nan if error is None else found.stick_fraction - true)
+            standard.append(nan if error is None else error)
     covered = np.abs(errors) <= 1.96 * np.array(standard)
     return {
         "ratio": ratio,
@@ -194,10 +194,10 @@ def _summary(case: Case, trials: Sequence[Trial], truth: dict[str, Any]) -> dict
     columns = {
         name: {
             "true": truth[name],
-            "bias": float(errors[:, k].mean()),
-            "scatter": float(errors[:, k].std()),
-            "rms": float(np.sqrt(np.mean(errors[:, k] ** 2))),
-            "standard_error": float(np.median(standard[:, k])),
+            "bias": float(np.nanmean(errors[:, k])),
+            "scatter": float(np.nanstd(errors[:, k])),
+            "rms": float(np.sqrt(np.nanmean(errors[:, k] ** 2))),
+            "standard_error": float(np.nanmedian(standard[:, k])),
             "covered": float(covered[:, k].mean()),
         }
         for k, name in enumerate(MEASURES)
