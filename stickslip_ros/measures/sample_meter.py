@@ -261,6 +261,7 @@ class SampleMeter:
         may_rest = self.reading.noisy is None or self._speeds.belt == 0.0
         rests = rests_and_slips(window, self._known) if may_rest else None
         if rests is not None and not rests.passes and not rests.agrees(measures):
+            # Rests that are not sure contradict pure slip and another period, and no other stick.
             sticks = measures.stick_fraction and rests.same_period(measures)
             if rests.rests or not sticks:
                 return segmented_measures(window, rests)

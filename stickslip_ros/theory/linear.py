@@ -246,7 +246,7 @@ def _tensors(system: DriveSystem, states: FloatArray, parameters: FloatArray) ->
 
 
 def _compiled_tensors(system: DriveSystem) -> tuple[list[npt.NDArray[np.intp]], Any]:
-    """Return a compiled function of the derivatives, and by order the tensor of rows in it."""
+    """Return, by order, where in the compiled function each derivative is; and that function."""
     by = [*system.variables, hy.par[system.index["belt_speed"]]]
     rates = list(system.shared_flow(SLIP).rates)
     tensors = hy.diff_tensors(rates, diff_args=by, diff_order=_ORDERS[-1])
