@@ -275,11 +275,11 @@ def _main(form: str, most: int) -> None:
             return
         # With a sign in its name, for numpy takes some names itself.
         vectors = {f"{unit.replace('=', ' ')}={name}": values for name, unit, values in table}
-    if sum(map(len, vectors.values())) > most:
-        sys.exit(f"it has more than {most} numbers")
-    target = BytesIO()
-    np.savez(target, **{name: values.astype(float) for name, values in vectors.items()})
-    sys.stdout.buffer.write(target.getbuffer())
+        if sum(map(len, vectors.values())) > most:
+            sys.exit(f"it has more than {most} numbers")
+        target = BytesIO()
+        np.savez(target, **{name: values.astype(float) for name, values in vectors.items()})
+        sys.stdout.buffer.write(target.getbuffer())
 
 
 if __name__ == "__main__":
