@@ -315,8 +315,10 @@ def test_a_damaged_bag_is_refused_in_a_sentence(write, tmp_path):
     assert "\n" not in str(refused.value)
 
 
-def test_a_missing_library_for_a_bag_is_named(monkeypatch):
+def test_a_missing_library_for_a_bag_is_named(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rosbags.convert.cli", None)
     monkeypatch.setattr("resource.setrlimit", lambda *_: None)
-    with pytest.raises(SystemExit, match="install rosbags"):
+    monkeypatch.setattr("os._exit", sys.exit)
+    with pytest.raises(SystemExit):
         bag_formats._main(Path("bag"), Path("mcap"))
+    assert "install rosbags" in capsys.readouterr().err
