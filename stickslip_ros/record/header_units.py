@@ -160,6 +160,7 @@ class Unit(NamedTuple):
     """SI unit."""
 
 
+@cache
 def units_in(name: str, given: str, target: str) -> list[Unit]:
     """Return the unit of a column: none, one, or several if it has several readings.
 

@@ -5,7 +5,6 @@ A unit is that of the column by its header or, without one, that of a line above
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
 from math import isnan, nan
 from typing import Any, NamedTuple
 
@@ -266,13 +265,8 @@ def _mentions(lines: Sequence[str], target: str) -> Iterator[_Mention]:
             if not are_units([word]) or not (certain or _TOLD.search(before)):
                 continue
             number = _NUMBER_BEFORE.search(before) or _NUMBER_BEHIND.match(behind)
-            for unit in _readings(word, target):
+            for unit in units_in("", word, target):
                 if unit.factor > 0.0 and unit.factor != 1.0:
                     yield _Mention(unit, line, number is not None)
-                elif label and all(isnan(u.factor) for si in _SI for u in _readings(word, si)):
+                elif label and all(isnan(u.factor) for si in _SI for u in units_in("", word, si)):
                     yield _Mention(unit, line, True)
-
-
-@cache
-def _readings(word: str, target: str) -> Sequence[Unit]:
-    return units_in("", word, target)
