@@ -125,12 +125,11 @@ class Layout:
         fields = {str(n): ("f8", place) for n, place in enumerate(values) if place is not None}
         if stamp is not None:
             fields |= {"sec": ("i4", stamp), "nanosec": ("u4", stamp + 4)}
-        formats, offsets = zip(*fields.values(), strict=True) if fields else ((), ())
         self._table = np.dtype(
             {
                 "names": [*fields],
-                "formats": [order + form for form in formats],
-                "offsets": offsets,
+                "formats": [order + form for form, _ in fields.values()],
+                "offsets": [place for _, place in fields.values()],
                 "itemsize": len(message.data),
             }
         )

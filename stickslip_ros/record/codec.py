@@ -356,12 +356,11 @@ class _ControllerJoints(_Joints):
     """The joints in a control_msgs/msg/JointTrajectoryControllerState, as they were measured."""
 
     def _sequences(self, message: Decoder) -> list[tuple[int, int]]:
-        for point in ("reference", "feedback"):  # desired and actual, in older versions
-            fields = [message.doubles(message.count()) for _ in range(4)]
-            if point == "reference":
-                self.reference = fields
-                message.skip_duration()
-        return [*fields[:2], fields[3]]
+        # In older versions they are the desired and the actual point.
+        self.reference = [message.doubles(message.count()) for _ in range(4)]
+        message.skip_duration()
+        feedback = [message.doubles(message.count()) for _ in range(4)]
+        return [*feedback[:2], feedback[3]]
 
 
 CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"

@@ -4,7 +4,6 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -127,7 +126,7 @@ def _value(node: ast.AST, named: Mapping[str, Any]) -> Any:
 
 def _unwrapped(counter: Any, turn: Any) -> Any:
     """Return a counter without its jumps by a whole turn; cells without a number are passed by."""
-    if np.ndim(turn) or not 0.0 < turn < np.inf or not isfinite(turn):
+    if np.ndim(turn) or not 0.0 < turn < np.inf:
         raise ValueError("the turn must be a positive number")
     if not np.ndim(counter):
         return counter

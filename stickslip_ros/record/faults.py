@@ -149,9 +149,8 @@ def differences(time: FloatArray, position: FloatArray) -> FloatArray:
             at, moved = time[part], position[part]
             velocity[part][1:-1] = (moved[2:] - moved[:-2]) / (at[2:] - at[:-2])
         if len(time) > 1:
-            for place, (before, after) in {0: (0, 1), -1: (-2, -1)}.items():
-                moved, lasting = (column[after] - column[before] for column in (position, time))
-                velocity[place] = moved / lasting
+            moved, lasting = (column[[1, -1]] - column[[0, -2]] for column in (position, time))
+            velocity[[0, -1]] = moved / lasting
     return velocity
 
 

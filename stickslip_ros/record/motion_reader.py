@@ -110,8 +110,7 @@ class MotionReader:
                         f"are of the joints {_listed(known)}"
                     )
                 )
-        where = self._topic, self._where
-        self.machine = MachineMotion(name, *where, self._layout, self._belt_speed)
+        self.machine = MachineMotion(name, self._topic, self._where, self._layout, self._belt_speed)
         if joint is None:
             return partial(self._only_joint, name)
         return partial(joint_layout, joint=name, belt=belt, kind=self._kind)

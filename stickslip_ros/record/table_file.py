@@ -21,7 +21,7 @@ from stickslip_ros.record.table_columns import ANY_FORM, SECOND, Table, TableFor
 from stickslip_ros.record.table_formats import format_of, read_foreign
 from stickslip_ros.record.table_quantities import Quantities, quantities_of
 from stickslip_ros.record.text_table import TextTable
-from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
+from stickslip_ros.samples import NO_FORCES, ForceColumns, ReferenceColumns, SampleColumns
 
 TABLE_SUFFIXES = (
     ".csv", ".mat", ".txt", ".dat", ".tsv", ".log", ".asc", ".xlsx", ".parquet", ".tdms", ".npz"
@@ -223,7 +223,6 @@ def _recording(path: Path, quantities: Quantities) -> TableRecording:
         values.get("friction_force", unknown),
         unknown,
         values.get("belt_velocity", rest),
-        *(unknown, unknown),
     )
     if not samples.is_valid.any():
         empty = [name for name, value in values.items() if not np.isfinite(value[present]).any()]
@@ -231,9 +230,7 @@ def _recording(path: Path, quantities: Quantities) -> TableRecording:
             f"{path}: no row gives a sample: no position has a number of "
             f"{' and '.join(empty) or 'velocity, for the times stand,'} beside it"
         )
-    forces = ForceColumns(stamp[:0], rest[:0])
-    if "force" in values:
-        forces = ForceColumns(stamp, values["force"])
+    forces = ForceColumns(stamp, values["force"]) if "force" in values else NO_FORCES
     references = ReferenceColumns(stamp, values.get("reference", unknown), unknown)
     estimated = 2 * np.count_nonzero(lacking) > np.count_nonzero(present)
     if "reference" not in values:
