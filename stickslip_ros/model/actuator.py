@@ -43,8 +43,7 @@ class Actuator:
         if limit == inf and not resolution:
             return None
 
-        def held(command: float) -> float:
-            force = command
+        def held(force: float) -> float:
             if not -limit < force < limit:
                 force = copysign(limit, force)
             if resolution:

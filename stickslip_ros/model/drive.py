@@ -62,8 +62,7 @@ class Drive(DriveConstants):
     The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
     Only N mu acts: with coefficients far from usual ones, such as those of N = 1 N, the unit of
     force is another part of the friction. A drive with m = k = N = 1 is the dimensionless system
-    itself. Without a spring, k = 0, the term
-    X vanishes, and the unit of speed is 1 m/s.
+    itself. Without a spring, k = 0, the term X vanishes, and the unit of speed is 1 m/s.
 
     Examples
     --------

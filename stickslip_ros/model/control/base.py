@@ -70,9 +70,7 @@ class LinearFeedback(NamedTuple):
     @property
     def holds_position(self) -> bool:
         """Whether the force depends on where slide and motor are together."""
-        return bool(np.any(self.direct[..., ::2].sum(axis=-1))) or bool(
-            np.any(self.input[..., ::2].sum(axis=-1))
-        )
+        return any(np.any(by[..., ::2].sum(axis=-1)) for by in (self.direct, self.input))
 
 
 class ContinuousControl(Protocol):

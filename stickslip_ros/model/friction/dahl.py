@@ -5,11 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from stickslip_ros.model.friction.base import FrictionLaw, Numbers, Values
-from stickslip_ros.model.friction.lugre import (
-    LEAST_SIZE,
-    bristle_stiffness,
-    deflection_after,
-)
+from stickslip_ros.model.friction.lugre import LEAST_SIZE, bristle_stiffness, deflection_after
 
 
 @dataclass(frozen=True)

@@ -93,14 +93,13 @@ class Directional(FrictionLaw):
 
     def refusal(self) -> str | None:
         """Return the refusal of either law; see `SteadyFriction.refusal`."""
-        refusal = self.forward.refusal()
-        if refusal is not None:
+        if (refusal := self.forward.refusal()) is not None:
             return refusal
-        refusal = self.reverse.refusal()
         for name in self.forward.direction_independent:
             ahead, back = (getattr(law, name) for law in (self.forward, self.reverse))
             if ahead != back:
                 return f"reverse.{name} = {back} must equal {name} = {ahead}"
+        refusal = self.reverse.refusal()
         names = {name: f"reverse.{name}" for name in self.reverse.constants()}
         return refusal and renamed(refusal, names)
 

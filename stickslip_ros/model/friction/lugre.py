@@ -135,8 +135,7 @@ class CurveFollower(SteadyPart):
         name = self.curve.name
         if self.curve.states:
             return f"curve = {name} must be a static law: it has a memory"
-        refusal = self.curve.refusal()
-        if refusal is not None:
+        if (refusal := self.curve.refusal()) is not None:
             return refusal
         if isinstance(self.curve, Stiction):
             return f"curve = {name} must be a law whose friction does not fall where slip starts"
