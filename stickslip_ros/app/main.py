@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext, redirect_stderr
-from typing import NoReturn
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.commands import COMMANDS, command_parser, overview
@@ -38,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not given or given[0] in ("-h", "--help"):
             print(overview(), flush=True)
             sys.exit(0)
-        parser = command_parser(_command_of(given))
+        parser = command_parser(_command_of(given[0]))
         known = argparse.Namespace(words=words, further=further)
         chosen, unknown = parser.parse_known_args(_with_negative_values(given[1:]), known)
         if unknown:
@@ -99,27 +98,20 @@ def _reason(error: OSError) -> str:
     return str(error)
 
 
-def _command_of(given: Sequence[str]) -> str:
-    """Return the command that the first word names, or show the versions."""
+def _command_of(name: str) -> str:
+    """Return the name of a command, or show the versions."""
     parser = argparse.ArgumentParser(
         prog="stickslip", usage="%(prog)s [-h] [--version] COMMAND ...", add_help=False
     )
-    parser.add_argument("--version", action=_ShowVersions, nargs=0)
-    parser.add_argument("command", metavar="COMMAND", nargs="?")
-    name: str = parser.parse_known_args(given[:1])[0].command or given[0]
+    parser.add_argument("--version", action="store_true")
+    if parser.parse_known_args([name])[0].version:
+        print(", ".join(f"{part} {version}" for part, version in versions().items()))
+        parser.exit()
     if name not in COMMANDS:
         known = f"known are {', '.join(sorted(COMMANDS))}"
         meant = did_you_mean(name, [*COMMANDS, "--version", "--help"], known)
         parser.error(f"unknown command {name!r:.80}; {meant}")
     return name
-
-
-class _ShowVersions(argparse.Action):
-    """Look the version numbers up when they are asked for: that takes longer than all else."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        print(", ".join(f"{name} {version}" for name, version in versions().items()))
-        parser.exit()
 
 
 if __name__ == "__main__":
