@@ -155,14 +155,14 @@ def scenario_of(
     arguments: argparse.Namespace,
     *overrides: str,
     namespace: str = DEFAULT_NAMESPACE,
-    other_nodes: bool = False,
     unused: Collection[str] = (),
     replaced: bool = False,
 ) -> "Scenario":
     """Return the scenario that was asked for, `overrides` applied after those given.
 
     A sentence on standard error names the values that are left to their defaults, except those that
-    are `unused` (NODE.PARAMETER). The controller can be `replaced` by one that is no control law.
+    are `unused` (NODE.PARAMETER). The controller can be `replaced` by one that is no control law,
+    for which the scenario may have sections of its own.
     """
     from stickslip_ros.scenarios.files import load_scenario
     from stickslip_ros.scenarios.keywords import described
@@ -175,7 +175,7 @@ def scenario_of(
         asked,
         namespace,
         base=arguments.base,
-        other_nodes=other_nodes,
+        other_nodes=replaced,
     )
     controlled = not (arguments.no_control or replaced)
     scenario = with_law(load, None if replaced else arguments.controller, needed=controlled)

@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
             slips=slips,
             kept=False,
             drawn=is_drawn(arguments),
-            **({"continued": continued} if continued else {}),
+            continued=continued,
             **reading,
         )
         for bag, continued in runs_of(bags).items()

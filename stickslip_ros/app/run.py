@@ -91,18 +91,14 @@ def run(arguments: argparse.Namespace) -> int:
     from stickslip_ros.show.measure_table import measure_table, report_sentences
     from stickslip_ros.show.quantities import Units
 
-    overrides: list[str] = []
-    if arguments.pace is not None:
-        overrides.append(f"plant.pace={arguments.pace}")
-    if arguments.duration is not None:
-        overrides.append(f"plant.duration={arguments.duration!r}")
+    given = {"pace": arguments.pace, "duration": arguments.duration}
+    overrides = [f"plant.{name}={value}" for name, value in given.items() if value is not None]
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
     scenario = scenario_of(
         arguments,
         *overrides,
         namespace=namespace,
-        other_nodes=controller is not None,
         unused=[] if controller is None else law_constants(),
         replaced=controller is not None,
     )
