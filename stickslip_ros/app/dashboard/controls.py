@@ -168,8 +168,7 @@ class SliderField:
 
     async def _set(self, value: float, *, again: bool = False) -> None:
         before = current(self._run, self.full_name)
-        node, _, name = self.full_name.partition(".")
-        answer = await asyncio.wrap_future(self._requests.set_parameter(node, name, value))
+        answer = await asyncio.wrap_future(self._requests.set_parameter(self.full_name, value))
         self._refusal.set_text(answer)
         self._outdated = True  # what was typed gives way to the value that the node has
         if not answer and not again and before is not None and before != value:
@@ -211,11 +210,10 @@ class OtherParameter:
         if chosen is None:
             self._refusal.set_text("choose a parameter first")
             return
-        node, _, name = chosen.partition(".")
         with refusals_in(self._refusal):
             unit, now = described(chosen).unit or "", current(self._run, chosen)
             value = number_within(chosen, self._field.value, unit, self._run.drive, now)
-            await report(self._requests.set_parameter(node, name, value), self._refusal)
+            await report(self._requests.set_parameter(chosen, value), self._refusal)
 
 
 class ParametersCard:
@@ -319,8 +317,7 @@ class Settings:
         refusals: list[str] = []
         for full_name, value in stored.values.items():
             if current(self._run, full_name) != value:
-                node, _, parameter = full_name.partition(".")
-                answer = self._requests.set_parameter(node, parameter, value)
+                answer = self._requests.set_parameter(full_name, value)
                 refusals.append(await asyncio.wrap_future(answer))
         if stored.active != self._run.control_on:
             await self._set_active(stored.active)

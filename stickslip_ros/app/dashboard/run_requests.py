@@ -49,8 +49,9 @@ class Requests:
         self._node, self._run = node, run
         self._pending: list[_Pending] = []
 
-    def set_parameter(self, node: str, name: str, value: Any) -> Answer:
-        """Set a parameter of a node while it runs."""
+    def set_parameter(self, full_name: str, value: Any) -> Answer:
+        """Set NODE.PARAMETER while the node runs."""
+        node, _, name = full_name.partition(".")
 
         def outcome(response: Any) -> str:
             if response.result.successful:

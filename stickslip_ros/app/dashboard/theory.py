@@ -157,11 +157,6 @@ class Theory:
         """Return the newest result of one of the computations of this module."""
         return self._results[computation]
 
-    @property
-    def busy(self) -> bool:
-        """Whether something is being computed, or is to be."""
-        return self._running is not None or any(r.is_stale for r in self._results.values())
-
     def follow(self) -> None:
         """Take a finished result, and start the next computation whose parameters changed."""
         if self._closed:

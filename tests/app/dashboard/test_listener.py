@@ -106,13 +106,13 @@ def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
 ) -> None:
     plant = run_loop(graph, observer)
     assert observer.run.parameters["plant"]["belt_speed"] == 0.2
-    assert not outcome(graph, observer.requests.set_parameter("plant", "belt_speed", 0.3))
+    assert not outcome(graph, observer.requests.set_parameter("plant.belt_speed", 0.3))
     graph.wait_until(lambda: observer.run.parameters["plant"]["belt_speed"] == 0.3, "the new value")
     set_parameter = observer.requests.set_parameter
-    refusal = outcome(graph, set_parameter("washout_controller", "corner_frequency", -1.0))
+    refusal = outcome(graph, set_parameter("washout_controller.corner_frequency", -1.0))
     assert "corner_frequency = -1.0 is invalid: must be a finite number above 0" in refusal
     assert observer.run.parameters["washout_controller"]["corner_frequency"] == 2.0
-    assert "rate cannot be changed" in outcome(graph, set_parameter("plant", "rate", 1.0))
+    assert "rate cannot be changed" in outcome(graph, set_parameter("plant.rate", 1.0))
     plant.set_parameters([Parameter("damping", value=0.5)])  # by others
     graph.wait_until(lambda: observer.run.parameters["plant"]["damping"] == 0.5, "the new value")
     for active, state in ((False, "inactive"), (True, "active")):

@@ -76,12 +76,14 @@ def test_a_long_computation_does_not_delay_the_end(
     wait_for(lambda: not active_children(), "the computation has ended")
 
 
-def settle(theory: Theory) -> None:
-    def done() -> bool:
-        theory.follow()
-        return not theory.busy
+def is_up_to_date(theory: Theory) -> bool:
+    theory.follow()
+    return not any(result.is_stale for result in theory._results.values())
 
-    wait_for(done, "all is computed", 5.0 * PATIENCE)  # it leaves the processor to others
+
+def settle(theory: Theory) -> None:
+    # It leaves the processor to others.
+    wait_for(lambda: is_up_to_date(theory), "all is computed", 5.0 * PATIENCE)
 
 
 def series(options: dict[str, Any], name: str) -> np.ndarray:
@@ -168,8 +170,7 @@ def test_only_what_a_parameter_changes_is_computed_again(
     unset = {name: float("nan") for name, value in PLANT.items() if value != value}
     assert unset
     run.parameters = run.parameters | {"plant": PLANT | unset}
-    theory.follow()
-    assert not theory.busy
+    assert is_up_to_date(theory)
     slower = run.parameters["plant"] | {"belt_speed": 0.039}
     run.parameters = run.parameters | {"plant": slower}
     settle(theory)
@@ -206,8 +207,7 @@ def test_nothing_is_computed_while_a_slider_moves(
 
 def test_an_unknown_drive_has_no_theory(run: RunState, theory: Theory) -> None:
     run.parameters = {"plant": {}, "washout_controller": {}}
-    theory.follow()
-    assert not theory.busy
+    assert is_up_to_date(theory)
 
 
 def test_a_slider_has_room_on_both_sides_of_any_value() -> None:
