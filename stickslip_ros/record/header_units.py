@@ -161,7 +161,7 @@ class Unit(NamedTuple):
 
 
 @cache
-def units_in(name: str, given: str, target: str) -> list[Unit]:
+def units_in(name: str, given: str, target: str) -> Sequence[Unit]:
     """Return the unit of a column: none, one, or several if it has several readings.
 
     `given` is its cell in a line of units, or empty; `target` the SI unit of the quantity for
