@@ -22,6 +22,10 @@ _PASSES = 4
 _BACK_SHARE = 1.1
 """Largest distance that a cycle covers beside the feed, in advances per cycle; it is less than one
 for a slide that does not go back."""
+_LAST_CYCLES = 5
+"""Number of cycles, at most, whose feed is the last one."""
+_ONE_FEED = 4.0
+"""Range of the positions less the mean feed, in advances per cycle, up to which there is one."""
 
 
 def mean_feed(time: FloatArray, position: FloatArray) -> float | None:
@@ -85,6 +89,37 @@ def moving_part(samples: SampleColumns) -> slice:
         return slice(0, len(samples))
     end = rows[last] + 1 if len(position) - 1 - last > longest else len(samples)
     return slice(int(begin), int(end))
+
+
+def last_feed(samples: SampleColumns) -> int:
+    """Return the row from which a slide that sticks and slips has its last feed; 0 without others.
+
+    The mean feed of several is that of none of them, and cycles seen from it are not those of the
+    slide. The last feed is that of the last cycles on a guide at rest.
+    """
+    rows = np.flatnonzero(samples.is_valid)
+    if not len(rows) or samples.belt_velocity[rows].any():
+        return 0
+    time = (samples.stamp[rows] - samples.stamp[rows[0]]) / NANOSECONDS
+    position = samples.position[rows]
+    last = stick_slip(time, position, 0.0, _LAST_CYCLES, 0.0)
+    if last is None or not last.feed:
+        return 0
+    time = time[time <= last.end]
+    position = position[: len(time)]
+    advance = last.feed * last.cycle.period
+    mean = (position[-1] - position[0]) / (time[-1] - time[0])
+    if np.ptp(position - mean * time) <= _ONE_FEED * abs(advance):
+        return 0
+    # The last of them is a release, where the slide is the farthest behind.
+    beside = (position - position[-1] - last.feed * (time - time[-1])) / advance
+    others = np.flatnonzero(np.abs(beside - 0.5) > 1.0)
+    if not len(others):
+        return 0
+    # Going back, the line is left about a cycle after the change.
+    begin = time[others[-1]] + last.cycle.period
+    lasting = time[-1] - begin > LEAST_CYCLES * last.cycle.period
+    return int(rows[time.searchsorted(begin)]) if lasting else 0
 
 
 def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.measures.cycle_measures import UNBOUNDED_BELT_SPEEDS, Regime
-from stickslip_ros.measures.feed import moving_part, relative_to_feed
+from stickslip_ros.measures.feed import last_feed, moving_part, relative_to_feed
 from stickslip_ros.measures.following import Followed, followed
 from stickslip_ros.measures.noise import FEWEST_SAMPLES
 from stickslip_ros.measures.run_meter import RunAnalysis, RunMeter, RunObserver
@@ -184,16 +184,20 @@ class RunFeed:
         return few and f"the regime is not known: {few} do not tell whether it sticks"
 
     def _moving_part(self, part: SampleColumns, first: int) -> SampleColumns:
-        """Return the samples without the standstills before and after them."""
+        """Return the samples of the last feed, without the standstills before and after them."""
         rows = moving_part(part)
-        moving = part[rows]
-        sides = " and ".join(["before"] * (rows.start > 0) + ["after"] * (rows.stop < len(part)))
-        if sides:
+        other = last_feed(part[rows])
+        moving = part[rows][other:]
+        before, after = rows.start > 0 and not other, rows.stop < len(part)
+        sides = " and ".join(["before"] * before + ["after"] * after)
+        left = ["before, the feed is another"] * (other > 0)
+        left += [f"{sides}, the position stands"] * bool(sides)
+        if left:
             since, until = ((stamp - first) / NANOSECONDS for stamp in moving.stamp[[0, -1]])
             whole = (part.stamp[-1] - first) / NANOSECONDS
             self._notes.append(
                 f"the measures are those from {since:.4g} s to {until:.4g} s of {whole:.4g} s: "
-                f"{sides}, the position stands"
+                + "; ".join(left)
             )
         return moving
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.measures.feed import mean_feed, relative_to_feed
+from stickslip_ros.measures.feed import last_feed, mean_feed, relative_to_feed
 from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
 
@@ -58,6 +58,21 @@ def test_samples_relative_to_the_feed_stick_to_the_guide() -> None:
     assert np.ptp(moved.position) == pytest.approx(5.2e-3, rel=1e-3)
     on_belt = SampleColumns(stamp, position, velocity, unknown, unknown, rest + 0.02)
     assert relative_to_feed(on_belt) == (on_belt, 0.0)
+
+
+def test_of_feeds_one_after_the_other_the_last_one_counts() -> None:
+    stamp = (1e6 * np.arange(8000)).astype(np.int64)
+    unknown, rest = np.full(8000, np.nan), np.zeros(8000)
+
+    def samples(feeds: FloatArray) -> SampleColumns:
+        travel = np.cumsum(feeds) * PERIOD / STEP * 1e-3
+        return SampleColumns(stamp, stairs(travel), rest, unknown, unknown, rest)
+
+    one, two = np.full(8000, 0.02), np.where(TIME < 4.0, 0.04, 0.02)
+    assert last_feed(samples(one)) == 0
+    row = last_feed(samples(two))
+    assert 4000 <= row < 4330  # within a cycle
+    assert relative_to_feed(samples(two)[row:])[1] == pytest.approx(0.02, rel=1e-3)
 
 
 def test_a_release_just_before_the_first_position_begins_no_cycle() -> None:
