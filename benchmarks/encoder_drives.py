@@ -161,7 +161,7 @@ def comparison(seed: int) -> Comparison:
 
 def right(regime: str | None, true: str | None) -> bool:
     """Is a regime the true one, or one that the encoder cannot tell from it?"""
-    return regime == true or (true == "equilibrium" and regime == "held")
+    return regime == true or {regime, true} == {"equilibrium", "held"}
 
 
 def counts(found: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -284,7 +284,8 @@ def _measured(
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
-    extremes = _extremes(time, position, np.searchsorted(time, release).tolist(), width)
+    at = np.searchsorted(time, release).tolist()
+    extremes, rounded = _extremes(time, position, at, width, max(step, noise))
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     still = [(before.landing, after.release) for before, after in pairwise(used)]
@@ -298,7 +299,7 @@ def _measured(
             frequency=1.0 / period,
             stick_fraction=1.0 - float(np.sum(durations)) / float(release[-1] - release[0]),
         ),
-        errors=_errors(means, used, width, max(step, noise)),
+        errors=_errors(means, used, width, hypot(_EXTREME_ERROR * max(step, noise), rounded)),
         sticks=True,
         amplitudes=means.amplitudes,
         end=float(release[-1]),
@@ -309,15 +310,15 @@ def _measured(
     )
 
 
-def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, resolution: float) -> Cycle:
-    """Return the standard errors of means, with those of the edges and the extremes.
+def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, extreme: float) -> Cycle:
+    """Return the standard errors of means, with those of the edges and of an `extreme`, m.
 
-    A slip has `width` rows, and the sensor a step or noise of `resolution`, m.
+    A slip has `width` rows.
     """
     errors, cycle, count = means.errors, means.cycle, len(means.amplitudes)
     assert errors is not None  # of three cycles
     edges = np.mean([slip.errors for slip in slips], axis=0) * len(slips) / count / cycle.period
-    extreme = hypot(_EXTREME_ERROR * resolution, _BETWEEN * cycle.amplitude / width**2)
+    extreme = hypot(extreme, _BETWEEN * cycle.amplitude / width**2)
     return replace(
         errors,
         amplitude=hypot(errors.amplitude, extreme),
@@ -456,28 +457,47 @@ def _cycle_starts(time: FloatArray, rests: list[Rest]) -> list[int]:
     return next((part.tolist() for part in parts[::-1] if len(part) > LEAST_CYCLES), [])
 
 
-def _extremes(time: FloatArray, position: FloatArray, rows: list[int], width: float) -> FloatArray:
+def _extremes(
+    time: FloatArray, position: FloatArray, rows: list[int], width: float, resolution: float
+) -> tuple[FloatArray, float]:
     """Return amplitudes, velocity amplitudes and midpoints of the cycles from row to row.
 
     Of parabolas through the samples around each (Savitzky and Golay, Analytical Chemistry 36,
     1964): displacements are extreme at a vertex, within shares of the `width` of a slip, in rows.
+    Parabolas round a corner, by as much as their reach: where half of it changes the amplitude by
+    more than half of the `resolution`, m, it is taken. Behind them is the last such change, m.
     """
     narrow, wide = (max(int(min(share * width, _WIDEST)), 1) for share in _SMOOTH_SHARES)
     first, last = max(rows[0] - wide, 0), rows[-1] + wide + 1
     period = float(time[-1] - time[0]) / (len(time) - 1)
     part = position[first:last]
-    smooth, slope, bend = parabolas(part, narrow)
+    cycles = [slice(start - first, end - first + 1) for start, end in pairwise(rows)]
+    (high, low), rounded = _displacements(part, cycles, narrow), 0.0
+    while narrow > 1:
+        narrow //= 2
+        highest, lowest = _displacements(part, cycles, narrow)
+        change = float(np.mean(highest - lowest - (high - low))) / 2.0
+        if change <= resolution / 2.0:
+            rounded = max(change, 0.0)
+            break
+        high, low, rounded = highest, lowest, change
     speed = parabolas(part, wide)[1] / period
+    swings = [high - low, [np.ptp(speed[cycle]) for cycle in cycles], high + low]
+    return np.array(swings) / 2.0, rounded
+
+
+def _displacements(
+    course: FloatArray, cycles: Sequence[slice], reach: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the highest and the lowest displacement of each cycle, by parabolas of a reach."""
+    smooth, slope, bend = parabolas(course, reach)
     # At a corner, as of a flat top, the rows beside it do not bend so, and there is no vertex.
     bends = np.pad(np.abs(bend), 1, mode="edge")
     least = np.minimum(np.minimum(bends[:-2], bends[2:]), bends[1:-1])
     with np.errstate(divide="ignore", invalid="ignore"):
         smooth -= np.where(np.abs(slope) < 2.0 * least, slope**2 / (4.0 * bend), 0.0)
-    cycles = [slice(start - first, end - first + 1) for start, end in pairwise(rows)]
-    high, low = (
-        np.array([extreme(smooth[cycle]) for cycle in cycles]) for extreme in (np.max, np.min)
-    )
-    return np.array([high - low, [np.ptp(speed[cycle]) for cycle in cycles], high + low]) / 2.0
+    parts = [smooth[cycle] for cycle in cycles]
+    return np.array([part.max() for part in parts]), np.array([part.min() for part in parts])
 
 
 def _creep(

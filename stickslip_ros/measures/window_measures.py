@@ -115,17 +115,19 @@ def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | 
 
 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
-    """Return measures whose stick fraction is not surer than its distance from that of the rests.
+    """Return measures that are not surer than their distance from those of the rests.
 
-    A distance of many errors shows that the friction has none of the forms of the fit.
+    A distance of many errors shows that the friction has none of the forms of the fit. Errors of
+    edges are generous, and those of extremes count.
     """
     errors = dict(refined.errors or {})
-    if refined.stick_fraction is None or "stick_fraction" not in errors:
-        return refined
-    apart = abs(refined.stick_fraction - segmented.cycle.stick_fraction)
-    if apart <= _APART * errors["stick_fraction"]:
-        return refined
-    return replace(refined, errors={**errors, "stick_fraction": apart / 2.0})
+    for name, error in (("amplitude", segmented.errors.amplitude), ("stick_fraction", 0.0)):
+        value = getattr(refined, name)
+        if value is not None and name in errors:
+            apart = abs(value - getattr(segmented.cycle, name))
+            if apart > _APART * hypot(errors[name], error):
+                errors[name] = apart / 2.0
+    return replace(refined, errors=errors or None)
 
 
 def rests_and_slips(window: Window, reading: SampleAssumptions) -> StickSlip | None:

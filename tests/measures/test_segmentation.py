@@ -58,6 +58,17 @@ def test_a_slip_that_overshoots_ends_when_it_has_come_back(over: float, noise: f
     assert found.cycle.stick_fraction == pytest.approx(1.0 - SLIP / PERIOD, abs=0.02)
 
 
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_the_amplitude_between_corners_is_within_its_error(every: int) -> None:
+    time = STAMPS[::every] * 1e-9
+    slips = np.clip(time % PERIOD / SLIP, 0.0, 1.0)
+    position = TRAVEL * (time // PERIOD + slips)
+    found = stick_slip(time, np.round(position / STEP) * STEP, 0.0, 20, STEP)
+    assert found is not None
+    amplitude, error = found.cycle.amplitude, found.errors.amplitude
+    assert abs(amplitude - TRAVEL * (1.0 - SLIP / PERIOD) / 2.0) < 3.0 * error < 0.06 * amplitude
+
+
 @pytest.mark.parametrize("times", [late, dropped])
 @pytest.mark.parametrize("uneven", [0.0, 0.3])
 def test_rests_by_turns_and_stamps_that_are_uneven_change_little(
