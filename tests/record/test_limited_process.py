@@ -1,5 +1,6 @@
 """Processes that read files of other tools."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import os
 from stickslip_ros.record.limited_process import limited
 
 atexit.register(os.abort)
-with limited("a library is missing"):
+with limited("install it"):
     print("a row")
     {last}
 """
@@ -22,21 +23,12 @@ with limited("a library is missing"):
 
 @pytest.mark.process
 @pytest.mark.parametrize(
-    ("last", "refused"),
-    [
-        ("pass", None),
-        ("raise KeyError('x')", "it is damaged: KeyError"),
-        ("import no_library", "a library is missing"),
-        ("raise SystemExit('it has 3 columns')", "it has 3 columns"),
-    ],
+    ("last", "refused"), [("pass", None), ("raise KeyError", "it is damaged: KeyError")]
 )
 def test_a_library_that_aborts_at_the_end_does_not_change_the_result(
     last: str, refused: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "reader.py").write_text(READER.format(last=last))
     monkeypatch.syspath_prepend(tmp_path)
-    if refused is None:
+    with pytest.raises(ValueError, match=f"^{refused}$") if refused else nullcontext():
         assert result_of("reader", seconds=60.0) == (b"a row\n", [])
-        return
-    with pytest.raises(ValueError, match=f"^{refused}$"):
-        result_of("reader", seconds=60.0)
