@@ -284,8 +284,7 @@ def _measured(
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
-    at = np.searchsorted(time, release).tolist()
-    extremes, rounded = _extremes(time, position, at, width, max(step, noise))
+    extremes, rounded = _extremes(time, position, release, width, max(step, noise))
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     still = [(before.landing, after.release) for before, after in pairwise(used)]
@@ -311,9 +310,9 @@ def _measured(
 
 
 def _errors(means: CycleMeans, slips: list[SlipEdges], width: float, extreme: float) -> Cycle:
-    """Return the standard errors of means, with those of the edges and of an `extreme`, m.
+    """Return the standard errors of means, with those of the edges and the extremes.
 
-    A slip has `width` rows.
+    A slip has `width` rows; `extreme` is the error of an amplitude by the sensor and by corners, m.
     """
     errors, cycle, count = means.errors, means.cycle, len(means.amplitudes)
     assert errors is not None  # of three cycles
@@ -458,15 +457,17 @@ def _cycle_starts(time: FloatArray, rests: list[Rest]) -> list[int]:
 
 
 def _extremes(
-    time: FloatArray, position: FloatArray, rows: list[int], width: float, resolution: float
+    time: FloatArray, position: FloatArray, release: FloatArray, width: float, resolution: float
 ) -> tuple[FloatArray, float]:
-    """Return amplitudes, velocity amplitudes and midpoints of the cycles from row to row.
+    """Return amplitudes, velocity amplitudes and midpoints of the cycles from release to release.
 
     Of parabolas through the samples around each (Savitzky and Golay, Analytical Chemistry 36,
     1964): displacements are extreme at a vertex, within shares of the `width` of a slip, in rows.
-    Parabolas round a corner, by as much as their reach: where half of it changes the amplitude by
-    more than half of the `resolution`, m, it is taken. Behind them is the last such change, m.
+    A parabola rounds a corner, the more the longer it reaches: while half of its reach changes the
+    mean amplitude by more than half of the `resolution`, m, the reach is halved. Also returns the
+    last change, m, which is an error.
     """
+    rows: list[int] = np.searchsorted(time, release).tolist()
     narrow, wide = (max(int(min(share * width, _WIDEST)), 1) for share in _SMOOTH_SHARES)
     first, last = max(rows[0] - wide, 0), rows[-1] + wide + 1
     period = float(time[-1] - time[0]) / (len(time) - 1)

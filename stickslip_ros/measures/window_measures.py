@@ -117,8 +117,9 @@ def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | 
 def _not_surer(refined: Measures, segmented: StickSlip) -> Measures:
     """Return measures that are not surer than their distance from those of the rests.
 
-    A distance of many errors shows that the friction has none of the forms of the fit. Errors of
-    edges are generous, and those of extremes count.
+    A distance of many errors shows that the friction has none of the forms of the fit. For an
+    amplitude both errors count; for a stick fraction only that of the fit, as the least error of an
+    edge would hide the distance.
     """
     errors = dict(refined.errors or {})
     for name, error in (("amplitude", segmented.errors.amplitude), ("stick_fraction", 0.0)):

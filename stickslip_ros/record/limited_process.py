@@ -57,5 +57,5 @@ def limited(libraries: str) -> Generator[None]:
         print(failure, file=sys.stderr)
     sys.stdout.flush()
     sys.stderr.flush()
-    # A few of a hundred processes that end in order are aborted by the threads of pyarrow.
+    # At a normal exit threads of pyarrow abort a few of a hundred processes.
     os._exit(bool(failure))

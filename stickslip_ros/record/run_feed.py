@@ -190,7 +190,7 @@ class RunFeed:
         moving = part[rows][other:]
         before, after = rows.start > 0 and not other, rows.stop < len(part)
         sides = " and ".join(["before"] * before + ["after"] * after)
-        left = ["before, the feed is another"] * (other > 0)
+        left = ["before, the feed differs"] * (other > 0)
         left += [f"{sides}, the position stands"] * bool(sides)
         if left:
             since, until = ((stamp - first) / NANOSECONDS for stamp in moving.stamp[[0, -1]])

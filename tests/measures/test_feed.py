@@ -9,6 +9,8 @@ from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
 
 TIME = 1e-3 * np.arange(8000, dtype=np.float64)
+STAMP = (1e6 * np.arange(8000)).astype(np.int64)
+UNKNOWN, REST = np.full(8000, np.nan), np.zeros(8000)
 PERIOD, STEP = 0.66, 6.6e-3
 
 
@@ -49,24 +51,19 @@ def test_other_motions_have_no_feed(position: FloatArray) -> None:
 def test_samples_relative_to_the_feed_stick_to_the_guide() -> None:
     position = stairs(TIME)
     velocity = np.gradient(position, TIME)
-    stamp = (1e6 * np.arange(8000)).astype(np.int64)
-    unknown, rest = np.full(8000, np.nan), np.zeros(8000)
-    samples = SampleColumns(stamp, position, velocity, unknown, unknown, rest)
+    samples = SampleColumns(STAMP, position, velocity, UNKNOWN, UNKNOWN, REST)
     moved, feed = relative_to_feed(samples)
     assert feed == pytest.approx(0.01, rel=2e-5)
     assert np.array_equal(moved.velocity == moved.belt_velocity, velocity == 0.0)
     assert np.ptp(moved.position) == pytest.approx(5.2e-3, rel=1e-3)
-    on_belt = SampleColumns(stamp, position, velocity, unknown, unknown, rest + 0.02)
+    on_belt = SampleColumns(STAMP, position, velocity, UNKNOWN, UNKNOWN, REST + 0.02)
     assert relative_to_feed(on_belt) == (on_belt, 0.0)
 
 
 def test_of_feeds_one_after_the_other_the_last_one_counts() -> None:
-    stamp = (1e6 * np.arange(8000)).astype(np.int64)
-    unknown, rest = np.full(8000, np.nan), np.zeros(8000)
-
     def samples(feeds: FloatArray) -> SampleColumns:
         travel = np.cumsum(feeds) * PERIOD / STEP * 1e-3
-        return SampleColumns(stamp, stairs(travel), rest, unknown, unknown, rest)
+        return SampleColumns(STAMP, stairs(travel), REST, UNKNOWN, UNKNOWN, REST)
 
     one, two = np.full(8000, 0.02), np.where(TIME < 4.0, 0.04, 0.02)
     assert last_feed(samples(one)) == 0

@@ -18,14 +18,14 @@ with limited("install it"):
     print("a row")
     {last}
 """
-"""A library of it aborts a process that ends in order, as threads of pyarrow do at times."""
+"""It is aborted at a normal exit, as it is at times by threads of pyarrow."""
 
 
 @pytest.mark.process
 @pytest.mark.parametrize(
     ("last", "refused"), [("pass", None), ("raise KeyError", "it is damaged: KeyError")]
 )
-def test_a_library_that_aborts_at_the_end_does_not_change_the_result(
+def test_an_abort_at_exit_does_not_change_the_result(
     last: str, refused: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "reader.py").write_text(READER.format(last=last))

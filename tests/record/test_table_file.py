@@ -195,6 +195,11 @@ def test_a_table_on_a_guide_at_rest_has_the_measures_of_its_stick_slip(tmp_path:
     assert any("advances at 10 mm/s on a guide at rest" in note for note in notes)
     assert any("6.677 mm in a cycle" in note for note in notes)
     assert any("the slips are rises" in note for note in notes)
+    faster = np.append(3.0 * position, 3.0 * position[-1] + position)
+    two = csv_of(tmp_path / "two.csv", t=np.append(time, time[-1] + 2e-3 + time), x=faster)
+    report = report_of_recording(two, {"time": "t", "position": "x"})
+    assert report["amplitude"] == pytest.approx(2.50295e-3, rel=0.01)
+    assert any("of 12 s: before, the feed differs" in note for note in report["notes"])
     belt = {"time": "t", "position": "0.01*t-x", "belt_velocity": "0.01"}
     few = report_of_recording(path, belt, end=2.4)
     assert (few["regime"], few["stick_fraction"]) == ("stick_slip", None)
