@@ -29,7 +29,7 @@ from stickslip_ros.text import must_be_one_of
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
-_FEWEST_CHANGES, _MOST_HELD = 16, 20
+_FEWEST_CHANGES, _MOST_HELD = 16, 100
 """Number of changes of a position from which it is known to be held; most rows for which it is."""
 
 
@@ -80,7 +80,9 @@ def quantities_of(
     values["time"], notes = even_times(time)
     cells.notes.extend(notes)
     if needed == "position":
-        held = _held(values["position"])
+        places = asked[needed].places if clocks[needed] == clock else ()
+        columns_in_it = (picked(np.asarray(cells.columns[place], float), rows) for place in places)
+        held = max((slice(0, None, 1), *map(_held, columns_in_it)), key=lambda held: held.step)
         if held.step > 1:
             own = np.full(len(time), nan)
             own[held] = values["position"][held]
@@ -97,13 +99,13 @@ def quantities_of(
     return Quantities(values, cells.notes)
 
 
-def _held(position: FloatArray) -> slice:
-    """Return which rows have a position of their own, as recorded faster than it is updated.
+def _held(column: FloatArray) -> slice:
+    """Return which rows have a value of their own, as recorded faster than it is updated.
 
     All changes are a multiple of the same number of rows apart.
     """
-    known = np.flatnonzero(np.isfinite(position))
-    changed = known[1:][np.diff(position[known]) != 0.0]
+    known = np.flatnonzero(np.isfinite(column))
+    changed = known[1:][np.diff(column[known]) != 0.0]
     if len(changed) < _FEWEST_CHANGES:
         return slice(0, None, 1)
     held = int(np.gcd.reduce(np.diff(changed)))

@@ -110,6 +110,15 @@ def test_rows_that_only_repeat_a_position_are_left_out(tmp_path: Path, first: in
     assert (report["samples"], report["lost_samples"]) == (len(samples), 0)
 
 
+def test_a_column_of_an_expression_may_only_repeat_its_position(tmp_path: Path) -> None:
+    """An even feed is no stick-slip where its encoder comes over a slow bus."""
+    time = np.arange(4000.0) / 1000.0
+    path = csv_of(tmp_path / "log.csv", t=time, x=0.01 * np.repeat(time[::50], 50), c=0.01 * time)
+    report = report_of_recording(path, {"time": "t", "position": "c-x"}, belt_speed=0.01)
+    assert report["regime"] in ("equilibrium", "held")
+    assert any("changes only every 50 rows" in note for note in report["notes"])
+
+
 @pytest.mark.process
 def test_rows_of_vectors_are_those_that_are_wanted(tmp_path: Path) -> None:
     path, columns = tmp_path / "log.mat", {"time": "log.t", "position": "log.x"}
