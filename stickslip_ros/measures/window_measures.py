@@ -46,7 +46,7 @@ from stickslip_ros.measures.noise import (
 )
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.sample_window import REVERSAL, Window
-from stickslip_ros.measures.segmentation import StickSlip, resting_velocity, stick_slip
+from stickslip_ros.measures.segmentation import StickSlip, moves, resting_velocity, stick_slip
 from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples
 
 _FEW_STEPS = 25.0
@@ -61,8 +61,14 @@ _LEAST_SLIP, _APART = 12.0, 4.0
 """Samples in a slip from which it does; errors of a stick fraction within which both agree."""
 _REST_SHARE = 0.2
 """Share of the time in which a slide rests on another guide than its belt."""
-_UNLIKE = 0.2
-"""Standard error of the mean period, in periods, above which cycles have nothing in common."""
+_UNLIKE, _UNLIKE_SLIPS = 0.2, 0.35
+"""Standard error of the mean period, in periods, above which cycles have nothing in common; of
+cycles without a stick, the standard deviation of their periods."""
+_STAND = 2.0
+"""Length of a stand of a slide on a guide at rest, in stands between its moves, from which it is
+stuck."""
+_MOST_HIDDEN = 0.05
+"""Standard error of a stick fraction of 0 above which nobody knows whether the slide sticks."""
 _RIPPLE = 4.0
 """Range of the middles of cycles beside a line, in amplitudes, above which they are ripples."""
 _OTHER_SPEED = 0.1
@@ -100,11 +106,13 @@ def measure(
 def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
     """Return measures without a regime where a rest may be hidden, or may be none.
 
-    It may be hidden where the slide passes the speed of the belt, and where it turns on a guide at
-    rest. It may be none at a speed so far from that of the belt that no calibration errs by it.
+    It may be hidden where the slide passes the speed of the belt, where few samples or noise hide
+    one, and where the slide turns on a guide at rest. It may be none at a speed so far from that of
+    the belt that no calibration errs by it.
     """
     slips = measures.regime is Regime.PURE_SLIP
     doubtful = slips and _may_rest_where_it_turns(window)
+    doubtful |= slips and (measures.errors or {}).get("stick_fraction", 0.0) > _MOST_HIDDEN
     if fit is not None:
         doubtful |= slips and fit.overtakes
         if fit.stick is not None:
@@ -235,7 +243,10 @@ def _by_reversals(
     part, resting, recent = window, window.resting, _recent(window, reading)
     # Few samples after a gap tell less than the cycles before it.
     enough = len(recent) >= (1 if window.before is None else FEWEST_SAMPLES)
-    if enough and 0.0 < _resolved(window, reading) >= float(np.ptp(recent.position)):
+    least = _resolved(window, reading)
+    if enough and 0.0 < least >= float(np.ptp(recent.position)):
+        if not recent.belt.any() and _may_move_on(window.samples.position, least):
+            return without_cycles(None, None), None
         return rest(recent, window, reading, Regime.HELD), None
     if len(part.cycles) < LEAST_CYCLES and window.before is not None and not resting:
         part = window.before
@@ -267,8 +278,15 @@ def _by_reversals(
     if measures.stick_fraction and measures.cycles < LEAST_CYCLES:  # nobody knows how much it errs
         measures = replace(measures, stick_fraction=None)
     periods = [cycle.period for cycle in part.cycles]
-    unlike = np.std(periods) > _UNLIKE * np.mean(periods) * len(periods) ** 0.5
+    most = _UNLIKE * len(periods) ** 0.5 if measures.stick_fraction else _UNLIKE_SLIPS
+    unlike = np.std(periods) > most * np.mean(periods)
     return undecided(measures) if unlike else measures, None
+
+
+def _may_move_on(position: FloatArray, least: float) -> bool:
+    """Return whether a slide stands no longer than between its moves by more than `least`, m."""
+    changes = np.flatnonzero(moves(position, least))
+    return len(changes) > 1 and len(position) - changes[-1] <= _STAND * np.diff(changes).max()
 
 
 def _are_ripples(cycles: Sequence[Cycle]) -> bool:
