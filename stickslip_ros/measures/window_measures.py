@@ -67,8 +67,6 @@ cycles without a stick, the standard deviation of their periods."""
 _STAND = 2.0
 """Length of a stand of a slide on a guide at rest, in stands between its moves, from which it is
 stuck."""
-_MOST_HIDDEN = 0.05
-"""Standard error of a stick fraction of 0 above which nobody knows whether the slide sticks."""
 _RIPPLE = 4.0
 """Range of the middles of cycles beside a line, in amplitudes, above which they are ripples."""
 _OTHER_SPEED = 0.1
@@ -106,13 +104,11 @@ def measure(
 def _undecided_if_doubtful(window: Window, measures: Measures, fit: MeanCycle | None) -> Measures:
     """Return measures without a regime where a rest may be hidden, or may be none.
 
-    It may be hidden where the slide passes the speed of the belt, where few samples or noise hide
-    one, and where the slide turns on a guide at rest. It may be none at a speed so far from that of
-    the belt that no calibration errs by it.
+    It may be hidden where the slide passes the speed of the belt, and where it turns on a guide at
+    rest. It may be none at a speed so far from that of the belt that no calibration errs by it.
     """
     slips = measures.regime is Regime.PURE_SLIP
     doubtful = slips and _may_rest_where_it_turns(window)
-    doubtful |= slips and (measures.errors or {}).get("stick_fraction", 0.0) > _MOST_HIDDEN
     if fit is not None:
         doubtful |= slips and fit.overtakes
         if fit.stick is not None:
