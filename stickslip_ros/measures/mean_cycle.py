@@ -60,11 +60,12 @@ class Shape:
         """Phases, s, at which extremes are looked for."""
         return np.linspace(0.0, self.period, _GRID, endpoint=False)
 
-    def overtakes(self, speed: float) -> bool:
-        """Return whether the velocity is above a speed, m/s, by three standard errors."""
+    @property
+    def fastest(self) -> tuple[float, float]:
+        """The highest velocity, m/s, and three of its standard errors."""
         velocity = self.velocity(self.grid)
         row = self.rates(self.grid[[np.argmax(velocity)]])[0]
-        return float(velocity.max()) - 3.0 * sqrt(row @ self.covariance @ row) > speed
+        return float(velocity.max()), 3.0 * sqrt(row @ self.covariance @ row)
 
     def rates(self, phase: FloatArray) -> FloatArray:
         """Return the derivatives of the rows by time, by a central difference."""
@@ -136,7 +137,8 @@ def fit_mean_cycle(
     stick, hidden, overtakes = None, 0.0, False
     if belt_speed > 0.0 and stick_speed == 0.0:
         stick, hidden = _find_stick(fold, shape, belt_speed, noise)
-        overtakes = shape.overtakes(_PASSING_SHARE * belt_speed)
+        fastest, error = shape.fastest
+        overtakes = fastest - error > _PASSING_SHARE * belt_speed
     if stick is not None:
         fold = fold.adjusted(fold.slip(stick.fit))
         shape = fold.slip(stick.fit)
@@ -339,7 +341,11 @@ def _find_stick(
     """Return the stick of the cycles, if they show one, and the stick time that would not."""
     part = _fast_part(shape, belt_speed)
     if part is None:
-        return None, 0.0
+        fastest, error = shape.fastest
+        far = fastest + error < STICKING_SHARE * belt_speed
+        far |= fastest - error > _PASSING_SHARE * belt_speed
+        # Where the noise hides how fast it is, a stick may be as long as the last term's period.
+        return None, 0.0 if far else 2.0 * shape.period / (len(shape.fitted) - 1)
     (centre, guess), gap = part, fold.period / fold.phases
     frequency = 2.0 * pi / fold.period
     reach = guess / 2.0 + _reach(noise * frequency / belt_speed) / frequency

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from benchmarks import measures_under_noise as study
 from stickslip_ros.measures import Measures, Regime
@@ -11,7 +12,7 @@ from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.options import SettlingOptions
 from stickslip_ros.studies.settling import ControlledDrive, MotionState, settle
 from stickslip_ros.studies.simulate import sensor_meter, simulate
-from tests.measures.records import behind_a_play, columns, fed
+from tests.measures.records import behind_a_play, columns, fed, milliseconds
 
 NOISY = SampleAssumptions(noisy=True)
 PERIOD = 0.0639242
@@ -108,6 +109,22 @@ def test_a_moving_axis_is_not_stuck() -> None:
     assert found.regime is None
 
 
+@pytest.mark.parametrize(("end", "regime"), [(1500, None), (2500, Regime.STUCK)])
+def test_an_axis_is_stuck_once_it_stands_for_longer_than_between_slips(
+    end: int, regime: Regime | None
+) -> None:
+    """Two slips of 0.2 s, 0.5 s apart."""
+    time = np.arange(end) * 1e-3
+    slips = np.clip(time / 0.2, 0.0, 1.0) + np.clip((time - 0.7) / 0.2, 0.0, 1.0)
+    assert measured(time, np.round(1e-3 * slips, 6), reading=UNKNOWN, belt=0.0).regime is regime
+
+
+def test_noise_that_wanders_beside_an_even_feed_is_no_cycle() -> None:
+    noise = lfilter([1e-6], [1.0, -0.97], np.random.default_rng(1).standard_normal(6000))
+    found = measured(np.arange(6000) * 1e-3, np.round(noise, 7), reading=UNKNOWN, belt=0.004)
+    assert found.regime is found.stick_fraction is None
+
+
 @pytest.mark.parametrize(
     "reading", [UNKNOWN, NOISY, SampleAssumptions()], ids=["unknown", "noisy", "exact"]
 )
@@ -162,8 +179,11 @@ def test_an_axis_that_stays_where_it_turns_has_no_pure_slip(
 def test_motion_that_the_spectrum_shows_is_motion_under_large_noise() -> None:
     position, _, truth = study.motion(0.04)
     position = position[:6000] + 3e-4 * np.random.default_rng(0).standard_normal(6000)
-    found = measured(np.arange(6000) * 1e-3, position)
-    assert found.regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
+    told = fed(columns(milliseconds(6000), position), NOISY).measured()
+    found = told.measures
+    assert found.regime is Regime.PURE_SLIP
+    assert truth.stick_fraction < 2.0 * found.errors["stick_fraction"] < 0.3
+    assert any("may hide sticks" in note for note in told.notes)
     assert found.amplitude == pytest.approx(truth.amplitude, abs=3.0 * found.errors["amplitude"])
     assert found.period == pytest.approx(truth.period, rel=0.005)
 
