@@ -25,12 +25,7 @@ from stickslip_ros.installed_packages import versions
 from stickslip_ros.measures.cycle_measures import Regime
 from stickslip_ros.measures.slips import SlipThreshold, slip_report, slips_in
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import (
-    Exponential,
-    FrictionLaw,
-    LuGre,
-    Stribeck,
-)
+from stickslip_ros.model.friction import Exponential, FrictionLaw, LuGre, Stribeck
 from stickslip_ros.motion import Motion
 from stickslip_ros.record.table_file import table_of
 from stickslip_ros.record.table_quantities import quantities_of

@@ -12,13 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from stickslip_ros.model.drive import Drive
-from stickslip_ros.model.friction import (
-    ElastoPlastic,
-    Exponential,
-    FrictionLaw,
-    LuGre,
-    MaxwellSlip,
-)
+from stickslip_ros.model.friction import ElastoPlastic, Exponential, FrictionLaw, LuGre, MaxwellSlip
 from stickslip_ros.motion import Motion
 
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)

@@ -28,14 +28,7 @@ from stickslip_ros.show import BLUE, GREEN, ORANGE
 from stickslip_ros.show.quantities import GREEK, Units
 from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.show.study_figure import draw_section, draw_transitions, regime_handles
-from stickslip_ros.show.style import (
-    SCREEN,
-    FigureStyle,
-    finish,
-    rendered,
-    save,
-    styled,
-)
+from stickslip_ros.show.style import SCREEN, FigureStyle, finish, rendered, save, styled
 from stickslip_ros.studies.transitions import transition_label
 
 _FIRST_COLOUR, _LATER_COLOUR, _BELT_COLOUR = "#888888", "#DDDDDD", "black"

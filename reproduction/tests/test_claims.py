@@ -11,15 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reproduction.claims import (
-    CHAPTERS,
-    CLAIMS,
-    COMPUTATIONS,
-    Claim,
-    Evidence,
-    Finding,
-    Verdict,
-)
+from reproduction.claims import CHAPTERS, CLAIMS, COMPUTATIONS, Claim, Evidence, Finding, Verdict
 from reproduction.claims.coefficients import Nonlinearity, samples
 from reproduction.claims.paper_values import FILTER, OPEN, Loop, at
 from reproduction.claims.verdict import Formula, Number, Observation, Result, agrees

@@ -166,11 +166,7 @@ def _slipping(relative: FloatArray, reach: float) -> BoolArray:
 
 
 def _moving_weight(
-    record: Record,
-    relative: FloatArray,
-    acceleration: FloatArray,
-    width: float,
-    path: float | None,
+    record: Record, relative: FloatArray, acceleration: FloatArray, width: float, path: float | None
 ) -> FloatArray | None:
     """Return the weight of each sample in rows that tell of slip; None if all do.
 

@@ -281,7 +281,7 @@ def _by_reversals(
 
 def _may_move_on(position: FloatArray, least: float) -> bool:
     """Return whether a slide stands no longer than between its moves by more than `least`, m."""
-    changes = np.flatnonzero(moves(position, least))
+    changes = np.flatnonzero(moves(position, least))[1:]  # the first is the start
     return len(changes) > 1 and len(position) - changes[-1] <= _STAND * np.diff(changes).max()
 
 

@@ -45,11 +45,7 @@ class DriveConstants:
         0.0, "Constant force on the slide, such as an offset.", "N", simplifies=True
     )
     guide_damping: float = constant(
-        0.0,
-        "Viscous damping between slide and belt.",
-        "N s/m",
-        at_least=0.0,
-        simplifies=True,
+        0.0, "Viscous damping between slide and belt.", "N s/m", at_least=0.0, simplifies=True
     )
 
 

@@ -116,11 +116,7 @@ class DriveView:
         return tuple(value * unit for value, unit in zip(memory, units, strict=True))
 
     def scaled_state(
-        self,
-        x: float,
-        y: float,
-        memory: Sequence[float] | None,
-        motor: Sequence[float] | None,
+        self, x: float, y: float, memory: Sequence[float] | None, motor: Sequence[float] | None
     ) -> list[float]:
         """Return the dimensionless state at X and Y, with memory and motor in SI units.
 

@@ -12,11 +12,7 @@ from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
 from stickslip_ros.motion.compiled_flow import Detail
 from stickslip_ros.motion.drive_view import DriveView
-from stickslip_ros.motion.hybrid_motion import (
-    STEPS_PER_UNIT,
-    HybridMotion,
-    TooManyStepsError,
-)
+from stickslip_ros.motion.hybrid_motion import STEPS_PER_UNIT, HybridMotion, TooManyStepsError
 from stickslip_ros.motion.motion_clock import MotionClock
 
 _STEPS_PER_SECOND = 1e8

@@ -16,12 +16,7 @@ from stickslip_ros.model.drive_layout import SPEED
 from stickslip_ros.model.drive_system import SLIP, STICK, DriveSystem
 from stickslip_ros.model.hybrid import Instant, Mode
 from stickslip_ros.motion.breakpoint_recorder import BreakpointRecorder
-from stickslip_ros.motion.compiled_flow import (
-    CompiledFlow,
-    Detail,
-    flow_rates,
-    parameter_values,
-)
+from stickslip_ros.motion.compiled_flow import CompiledFlow, Detail, flow_rates, parameter_values
 from stickslip_ros.motion.hybrid_motion import StepBudget
 from stickslip_ros.motion.motion import Motion, RecordedMotion
 from stickslip_ros.motion.phase import Phase

@@ -382,11 +382,7 @@ def _joined(runs: Sequence[_Run]) -> _Run:
 
 
 def read_forces(
-    layout_of: Callable[[bytes], Layout],
-    messages: Messages,
-    log_time: IntArray,
-    *,
-    by_log: bool,
+    layout_of: Callable[[bytes], Layout], messages: Messages, log_time: IntArray, *, by_log: bool
 ) -> tuple[ForceColumns, bool, Refused]:
     """Return forces, whether one has no stamp, and what was refused.
 

@@ -43,9 +43,7 @@ class Quantities(NamedTuple):
 
 
 def quantities_of(
-    table: Table,
-    columns: Mapping[str, str] | None = None,
-    belt_speed: float | None = None,
+    table: Table, columns: Mapping[str, str] | None = None, belt_speed: float | None = None
 ) -> Quantities:
     """Return the quantities that a table has.
 

@@ -30,11 +30,7 @@ from stickslip_ros.show.style import (
     title_of,
 )
 from stickslip_ros.studies.design import Design
-from stickslip_ros.theory.bifurcation_branches import (
-    BifurcationBranches,
-    Branch,
-    require_branches,
-)
+from stickslip_ros.theory.bifurcation_branches import BifurcationBranches, Branch, require_branches
 from stickslip_ros.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.theory.linear_sampled_loop import (
     LONGEST_DELAY,

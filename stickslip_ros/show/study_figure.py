@@ -23,15 +23,7 @@ from stickslip_ros.show.drawing import label_axis
 from stickslip_ros.show.quantities import MEASURES, Units, check_colour
 from stickslip_ros.show.regimes import REGIMES, Look
 from stickslip_ros.show.study_tables import attractor_name
-from stickslip_ros.show.style import (
-    DASHES,
-    MANY,
-    SCREEN,
-    FigureStyle,
-    finish,
-    styled,
-    title_of,
-)
+from stickslip_ros.show.style import DASHES, MANY, SCREEN, FigureStyle, finish, styled, title_of
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Continuation, Grid

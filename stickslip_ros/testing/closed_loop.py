@@ -370,10 +370,7 @@ class ClosedLoop:
     def _find_controller(self, nodes: Composition) -> list[str]:
         """Wait for a controller, bring it up and return its full name; RunError if none appears."""
         search = ControllerSearch(
-            nodes.plant,
-            self.namespace,
-            nodes.nodes,
-            force_topics(self.scenario.plant.force_type),
+            nodes.plant, self.namespace, nodes.nodes, force_topics(self.scenario.plant.force_type)
         )
         elsewhere = self.controller is None
         timeout = _PROCESS_TIMEOUT if elsewhere else _NODE_TIMEOUT

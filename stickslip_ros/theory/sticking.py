@@ -143,8 +143,7 @@ def _followed(drive: Drive, speeds: Sequence[float]) -> _Onset:
     if above is not None:
         return zero_between(lambda speed: np.tanh(excess(speed)), speed, above), None
     sticking = next(
-        (speed for speed in speeds if release_margin(replace(drive, belt_speed=speed)) > 0.0),
-        0.0,
+        (speed for speed in speeds if release_margin(replace(drive, belt_speed=speed)) > 0.0), 0.0
     )
     if sticking == speed:
         return None, f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"

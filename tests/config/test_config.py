@@ -56,11 +56,7 @@ def messages() -> Messages:
     made = {full_name(topic): message_class(topic.type_name)() for topic in PLOTTED}
     state = pack_joint_state(0, (0, 0), (0, 0), (0, 0))
     made[full_name(JOINT_STATES)] = deserialize_message(state, JointState)
-    with (
-        environment(this_machine_only()),
-        own_domain() as domain,
-        closing(Graph(domain)) as graph,
-    ):
+    with environment(this_machine_only()), own_domain() as domain, closing(Graph(domain)) as graph:
         heard = graph.listen(DIAGNOSTICS)
         graph.add_active(AnalyzerNode)
         heard.clear()

@@ -16,6 +16,11 @@ from tests.measures.records import behind_a_play, columns, fed, milliseconds
 
 NOISY = SampleAssumptions(noisy=True)
 PERIOD = 0.0639242
+ENCODER = (
+    "plant.sensor.velocity=difference",
+    "plant.sensor.difference_samples=8",
+    "washout_controller.start_after=0",
+)
 
 
 def measured(
@@ -72,15 +77,7 @@ def test_a_stick_shows_in_a_few_steps(size: int) -> None:
 
 
 def test_a_loop_that_holds_within_a_step_is_held_in_the_motion_as_in_its_samples() -> None:
-    scenario = load_scenario(
-        "feed_drive",
-        [
-            "plant.sensor.position_resolution=5e-6",
-            "plant.sensor.velocity=difference",
-            "plant.sensor.difference_samples=8",
-            "washout_controller.start_after=0",
-        ],
-    )
+    scenario = load_scenario("feed_drive", ["plant.sensor.position_resolution=5e-6", *ENCODER])
     meter = sensor_meter(scenario)
     assert simulate(scenario, 3.0, measured=meter).regime is Regime.HELD
     assert meter.measures().regime is Regime.HELD
@@ -88,12 +85,7 @@ def test_a_loop_that_holds_within_a_step_is_held_in_the_motion_as_in_its_samples
 
 def test_a_few_cycles_within_a_step_that_grow_by_chance_leave_it_steady() -> None:
     """Four cycles are measured, as in a sweep."""
-    encoder = [
-        "plant.sensor.position_resolution=5e-7",
-        "plant.sensor.velocity=difference",
-        "plant.sensor.difference_samples=8",
-        "washout_controller.start_after=0",
-    ]
+    encoder = ["plant.sensor.position_resolution=5e-7", *ENCODER]
     settling = SettlingOptions(transient=60.0)
     for belt in (0.0480, 0.0481818, 0.0484):
         scenario = load_scenario("feed_drive", [*encoder, f"plant.belt_speed={belt}"])

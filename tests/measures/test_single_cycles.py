@@ -14,11 +14,7 @@ from stickslip_ros.measures.noise import medians
 from stickslip_ros.measures.sample_assumptions import EXACT, UNKNOWN, SampleAssumptions
 from stickslip_ros.measures.sample_meter import SampleMeter
 from stickslip_ros.measures.sample_window import Window, WindowMeter
-from stickslip_ros.measures.single_cycles import (
-    NoisySamples,
-    extreme_near,
-    reversals,
-)
+from stickslip_ros.measures.single_cycles import NoisySamples, extreme_near, reversals
 from stickslip_ros.measures.window_measures import rest
 from tests.measures.records import columns, milliseconds
 

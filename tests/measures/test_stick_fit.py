@@ -30,12 +30,7 @@ def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np
 
 
 @examples(quick=2, thorough=12)
-@given(
-    st.floats(0.003, 0.04),
-    st.floats(-0.002, 0.002),
-    st.floats(0.0, 0.3),
-    st.floats(0.9, 1.1),
-)
+@given(st.floats(0.003, 0.04), st.floats(-0.002, 0.002), st.floats(0.0, 0.3), st.floats(0.9, 1.1))
 def test_edges_of_an_exact_motion_are_found(
     stick_time: float, shift: float, drop: float, told: float
 ) -> None:

@@ -11,10 +11,7 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.model.drive import Drive
 from stickslip_ros.model.drive_layout import SIGN, SPEED
-from stickslip_ros.model.friction import (
-    Coulomb,
-    Stribeck,
-)
+from stickslip_ros.model.friction import Coulomb, Stribeck
 from stickslip_ros.model.hybrid import Instant
 from stickslip_ros.model.plain_drive import drive_system
 from stickslip_ros.model.signals import sine

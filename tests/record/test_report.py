@@ -5,16 +5,7 @@ from stickslip_ros.record.codec import pack_reference
 from stickslip_ros.record.recorder import Recorder
 from stickslip_ros.record.report import report_of_recording
 from stickslip_ros.samples import Reference
-from tests.record.runs import (
-    PERIOD,
-    SECOND,
-    STAMPS,
-    STATES,
-    motion,
-    record,
-    state,
-    write_bag,
-)
+from tests.record.runs import PERIOD, SECOND, STAMPS, STATES, motion, record, state, write_bag
 
 
 def test_a_bag_with_references_tells_the_following_error_to_the_newest_one(tmp_path):

@@ -12,14 +12,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.show.style import (
-    SCREEN,
-    STYLES,
-    FigureStyle,
-    save,
-    styled,
-    title_of,
-)
+from stickslip_ros.show.style import SCREEN, STYLES, FigureStyle, save, styled, title_of
 
 
 @styled

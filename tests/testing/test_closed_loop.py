@@ -149,10 +149,7 @@ def test_parameters_of_a_command_are_those_of_the_scenario_unless_it_has_its_own
     ],
 )
 def test_a_controller_that_does_not_start_is_reported(command: list[str], sentence: str) -> None:
-    with (
-        pytest.raises(RunError, match=sentence),
-        ClosedLoop("paper", controller=command) as loop,
-    ):
+    with pytest.raises(RunError, match=sentence), ClosedLoop("paper", controller=command) as loop:
         loop.run(1.0)
 
 
@@ -317,10 +314,7 @@ class _BestEffort(Node):
 
 @pytest.mark.long
 def test_a_controller_that_is_not_found_is_explained() -> None:
-    with (
-        pytest.raises(RunError) as told,
-        ClosedLoop("paper", controller=_BestEffort) as loop,
-    ):
+    with pytest.raises(RunError) as told, ClosedLoop("paper", controller=_BestEffort) as loop:
         loop.run(1.0)
     for sentence in ("/feed_drive/best_effort", "Best effort publisher"):
         assert sentence in str(told.value)

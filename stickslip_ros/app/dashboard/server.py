@@ -48,11 +48,7 @@ _LONGEST_LINE = 300
 
 
 def serve(
-    namespace: str,
-    listening: socket.socket,
-    reach: str,
-    readable: Collection[str],
-    command: str,
+    namespace: str, listening: socket.socket, reach: str, readable: Collection[str], command: str
 ) -> None:
     """Serve the page of a namespace on a socket that listens, until SIGINT or SIGTERM.
 
