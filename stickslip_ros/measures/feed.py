@@ -7,7 +7,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.cycle_measures import LEAST_CYCLES
 from stickslip_ros.measures.noise import NOISE_SAMPLES, PRECISION, encoder_step, rises, white_noise
-from stickslip_ros.measures.segmentation import moves, stick_slip
+from stickslip_ros.measures.rests import moves
+from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 

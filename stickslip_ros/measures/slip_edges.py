@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.noise import medians
+from stickslip_ros.measures.rests import Rest
 
 _NEAR_STEPS = 0.6
 """Distance from a rest that is none, in steps of the encoder."""
@@ -40,14 +41,6 @@ _ROW_ERROR = 0.3
 """Least standard error of an edge, in sample periods."""
 _SLIP_ERROR = 0.03
 """Least standard error of an edge, in durations of the slip."""
-
-
-class Rest(NamedTuple):
-    """A rest: its first and last rows, and where it is, m."""
-
-    first: int
-    last: int
-    level: float
 
 
 class SlipEdges(NamedTuple):

@@ -44,9 +44,10 @@ from stickslip_ros.measures.noise import (
     resolved,
     strongest_line,
 )
+from stickslip_ros.measures.rests import moves, resting_velocity
 from stickslip_ros.measures.sample_assumptions import SampleAssumptions
 from stickslip_ros.measures.sample_window import REVERSAL, Window
-from stickslip_ros.measures.segmentation import StickSlip, moves, resting_velocity, stick_slip
+from stickslip_ros.measures.segmentation import StickSlip, stick_slip
 from stickslip_ros.measures.single_cycles import LEAST_STICK, NoisySamples
 
 _FEW_STEPS = 25.0
