@@ -184,6 +184,20 @@ def test_a_plant_of_others_that_has_its_name_ends_the_run_at_once(
     assert other.lifecycle_state == "inactive"
 
 
+@pytest.mark.process
+def test_what_a_plant_waits_for_in_vain_is_named(
+    stickslip: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where somebody deactivates the controller before the plant is active."""
+    monkeypatch.setattr("stickslip_ros.nodes.running.bringup._READY_TIMEOUT", 3.0)
+    for transition in ("start", "stop"):
+        name = f"stickslip_ros.nodes.controller.ControllerNode.{transition}"
+        monkeypatch.setattr(name, lambda node: None)
+    done = stickslip("run", "paper", "--composed", "--bag", "bag")
+    assert done.returncode == 1
+    assert "plant did not become ready within 3 s (missing: washout_controller)" in done.stderr
+
+
 NEIGHBOUR = """
 import rclpy
 from sensor_msgs.msg import JointState

@@ -56,6 +56,8 @@ FAILURE = "failure"
 """Key of the reason why the plant, or the recording, could not continue, if it could not."""
 REFUSAL = "refusal"
 """Key of the reason why the last transition of a node has failed."""
+WAITING = "waiting"
+"""Key of what a node waits for before it becomes active, if it does."""
 FINISHED = "finished"
 """Key of whether the plant has paused by itself, not on request."""
 
@@ -119,8 +121,7 @@ class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
         """Messages that the node has dropped since it was activated."""
         self.read_last: Publisher | None = None
         """Publisher whose topic recorders subscribe to last; None if they read only one."""
-        self._refusal = ""
-        self._waiting = False
+        self._refusal = self._missing = ""
         for service in self.services:  # those of rclpy
             service.callback = partial(_answered, self.get_logger(), service.callback)
         self._diagnostics = self.create_publisher(
@@ -197,6 +198,8 @@ class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
         level, message, values = self.diagnose()
         if self._refusal:
             level, message, values = ERROR, self._refusal, {**values, REFUSAL: self._refusal}
+        if self._missing:
+            values = {**values, WAITING: self._missing}
         status = DiagnosticStatus(
             level=level,
             name=self.get_fully_qualified_name(),
@@ -238,14 +241,13 @@ class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
 
     def on_configure(self, state: LifecycleState) -> Transition:
         """Connect."""
-        self._waiting = False
+        self._missing = ""
         return self._transition(self.connect, "configured")
 
     def on_activate(self, state: LifecycleState) -> Transition:
         """Start, if the nodes in wait_for are connected."""
         if self._is_waiting():
             return TransitionCallbackReturn.FAILURE
-        self._waiting = False
         self.dropped = DroppedMessages(self.get_logger())
         for refusal in schedule_process(self.parameters):
             self.get_logger().warning(refusal)
@@ -302,12 +304,11 @@ class ManagedNode(KeepingNode, ParameterNode[ParametersT], ABC):
 
     def _is_waiting(self) -> bool:
         """Return whether a node is missing; log its name, once until this node is active."""
-        missing = self.missing_peers()
-        if missing and not self._waiting:
-            self._waiting = True
+        before, self._missing = self._missing, self.missing_peers()
+        if self._missing and not before:
             whom = " for " + ", ".join(self.parameters.wait_for) if self.parameters.wait_for else ""
-            self.get_logger().info(f"waiting{whom}: {missing}")
-        return bool(missing)
+            self.get_logger().info(f"waiting{whom}: {self._missing}")
+        return bool(self._missing)
 
     def _autostart(self) -> None:
         """Configure, then try to activate until the nodes in wait_for are connected."""

@@ -17,6 +17,7 @@ from rclpy.task import Future
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import EXIT_TIMEOUT, ChildProcesses, how_it_ended
 from stickslip_ros.nodes.base.clients import ACTIVE, NEXT_TRANSITION, LifecycleClient, setting_call
+from stickslip_ros.nodes.base.managed import REFUSAL, WAITING
 from stickslip_ros.nodes.base.network import domain_of_environment, lock_namespace
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, ros_session
 from stickslip_ros.nodes.base.spinner import Spinner, signal_handlers_kept, stop_on_signals
@@ -255,13 +256,14 @@ class _Supervisor:
 
     def _take_through(self, node: str, transition: int) -> None:
         """Take a node through a transition; repeat the request while it waits for other nodes."""
-        name, refusals = full_name(self._namespace, node), self._monitor.refusals
+        name, values = full_name(self._namespace, node), self._monitor.values
         configures, ready = transition == Transition.TRANSITION_CONFIGURE, False
 
         def is_settled() -> bool:
             nonlocal ready
             ready = self._nodes.change_state(node, transition)
-            return ready or bool(refusals.get(name)) or (configures and self._is_named_twice(name))
+            refused = REFUSAL in values.get(name, {})
+            return ready or refused or (configures and self._is_named_twice(name))
 
         self._spinner.spin_until(
             is_settled,
@@ -269,10 +271,12 @@ class _Supervisor:
             # Only an activation waits for others; a node logs each request that it must refuse.
             period=0.5 if configures else 0.02,
         )
-        if refusals.get(name):
-            self._fail(f"{node} could not start: {refusals[name]}")
+        told = values.get(name, {})
+        if REFUSAL in told:
+            self._fail(f"{node} could not start: {told[REFUSAL]}")
         elif not ready and not self._is_ended():
             why = f"did not become ready within {_READY_TIMEOUT:g} s"
+            why += f" ({told[WAITING]})" if WAITING in told else ""
             if self._is_named_twice(name):
                 why = "could not start: another node has its name, and answers in its place"
             self._fail(f"{node} {why}")

@@ -33,8 +33,8 @@ class RunMonitor:
         on_simulated_time: OnSimulatedTime,
     ) -> None:
         """Subscribe through a node in the run's namespace; call `fail` if the plant fails."""
-        self.plant: dict[str, str] = {}
-        """The plant's last values, as in its diagnostics."""
+        self.values: dict[str, dict[str, str]] = {}
+        """Last values of each node, as in its diagnostics, by its full name."""
         self.finished = False
         """Whether the plant has reached its end, or was ended from outside."""
         self.plant_stopped = False
@@ -48,8 +48,6 @@ class RunMonitor:
         """Why the analyzer could not continue to record; empty if it could."""
         self.recording_ended: bool = False
         """Whether the analyzer has published its last values after it was active."""
-        self.refusals: dict[str, str] = {}
-        """Why the last transition of each node has failed, by full name; empty if it has not."""
         self._namespace = node.get_namespace()
         self._paused = self._forecast_told = False
         self._first_recorded: int | None = None
@@ -59,6 +57,11 @@ class RunMonitor:
         node.create_subscription(Header, RECORDED.name, self._on_recorded, qos_profile(RECORDED))
 
     @property
+    def plant(self) -> dict[str, str]:
+        """The plant's last values."""
+        return self.values.get(full_name(self._namespace, "plant"), {})
+
+    @property
     def unrecorded(self) -> float:
         """Time from the newest sample that the analyzer has received to the plant's last, s."""
         return (number_in(self.plant.get(managed.NEWEST_STAMP, "")) - self.newest_recorded) * 1e-9
@@ -66,9 +69,8 @@ class RunMonitor:
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             values = {entry.key: entry.value for entry in status.values}
-            self.refusals[status.name] = values.get(managed.REFUSAL, "")
+            self.values[status.name] = values
             if status.name == full_name(self._namespace, "plant"):
-                self.plant = values
                 self._follow_plant(values.get(managed.STATE))
             elif status.name == full_name(self._namespace, "analyzer"):
                 self.recording_failure = values.get(managed.FAILURE, self.recording_failure)
