@@ -41,12 +41,12 @@ BELT_SPEEDS = (0.01, 0.02, 0.03, 0.04, 0.044, 0.048)
 RESOLUTIONS = (1e-7, 1e-6, 5e-6)
 VELOCITY_NOISE = (0.001, 0.01, 0.1)
 """In belt speeds."""
-SEEDS = 200
+SEEDS = 60
 WINDOW = 20
 MEASURES = ("amplitude", "velocity_amplitude", "midpoint", "period", "stick_fraction")
 RATIOS, EXPONENTS, TOLD = (0.3, 0.67, 1.0, 2.0, 5.0), (1.0, 2.0), (0.0, 0.01, 0.03)
 """Decay speed in belt speeds, exponents, and errors of the belt speed as a share of it."""
-STICK_SEEDS = 60
+STICK_SEEDS = 20
 STICK_LIMITS = dict(zip(RESOLUTIONS, (0.001, 0.002, 0.005), strict=True))
 _SETTLED, _LONGEST, _PERIOD, _BELT_SPEED = 30.0, 2000, 0.001, 0.04
 
@@ -206,6 +206,7 @@ def _summary(case: Case, trials: Sequence[Trial], truth: dict[str, Any]) -> dict
         "belt_speed": case.belt_speed,
         "resolution": case.resolution,
         "velocity_noise": case.velocity_noise,
+        "seeds": len(trials),
         "regime": truth["regime"],
         "regime_right": sum(trial.regime for trial in trials) / len(trials),
         "steady": sum(trial.steady for trial in trials) / len(trials),

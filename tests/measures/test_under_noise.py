@@ -1,6 +1,6 @@
 """The measures under noise, from samples as a sensor tells them.
 
-benchmarks/measures_under_noise.json has 200 seeds for each case; here are five for a sixth of them.
+benchmarks/measures_under_noise.json has 60 seeds for each case; here are five for a sixth of them.
 """
 
 import json
@@ -46,7 +46,7 @@ def measured(samples: SampleColumns, reading: SampleAssumptions = NOISY) -> Meas
 
 
 def test_what_the_study_has_found_is_as_good_as_it_is_to_be() -> None:
-    assert COMMITTED["seeds"] == 200
+    assert min(case["seeds"] for case in COMMITTED["cases"]) == 60
     assert len(COMMITTED["cases"]) == len(study.CASES)
     assert study.shortfalls(COMMITTED) == []
 
