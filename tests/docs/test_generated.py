@@ -20,7 +20,7 @@ from tests.nodes.graph import Graph
 DOCS = Path(__file__).parents[2] / "docs"
 EVERY_NODE = ("plant", "washout_controller", "analyzer")
 # Of the table, those that a run in which nothing goes wrong has none of.
-RARE = {"dropped: …", "failure", "refusal", "bag", "forecast"}
+RARE = {"dropped: …", "failure", "refusal", "waiting", "bag", "forecast"}
 
 
 @pytest.fixture
