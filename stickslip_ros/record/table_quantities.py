@@ -1,6 +1,6 @@
 """Quantities of a run in the columns of a table, all at the times of its positions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import nan
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
 _FEWEST_CHANGES, _MOST_HELD = 16, 100
-"""Number of changes of a position from which it is known to be held; most rows for which it is."""
+"""Number of changes of a column from which it is known to be held; most rows for which it is."""
 
 
 class Quantities(NamedTuple):
@@ -79,8 +79,8 @@ def quantities_of(
     cells.notes.extend(notes)
     if needed == "position":
         places = asked[needed].places if clocks[needed] == clock else ()
-        columns_in_it = (picked(np.asarray(cells.columns[place], float), rows) for place in places)
-        held = max((slice(0, None, 1), *map(_held, columns_in_it)), key=lambda held: held.step)
+        every = [np.asarray(cells.columns[place], float) for place in places]
+        held = _held([picked(column, rows) for column in every if len(column) > 1])
         if held.step > 1:
             own = np.full(len(time), nan)
             own[held] = values["position"][held]
@@ -97,18 +97,21 @@ def quantities_of(
     return Quantities(values, cells.notes)
 
 
-def _held(column: FloatArray) -> slice:
-    """Return which rows have a value of their own, as recorded faster than it is updated.
+def _held(columns: Iterable[FloatArray]) -> slice:
+    """Return the rows at which the column that is updated least often has a value of its own.
 
-    All changes are a multiple of the same number of rows apart.
+    A column that is recorded faster than it is updated repeats its values: all its changes are a
+    multiple of the same number of rows apart.
     """
-    known = np.flatnonzero(np.isfinite(column))
-    changed = known[1:][np.diff(column[known]) != 0.0]
-    if len(changed) < _FEWEST_CHANGES:
-        return slice(0, None, 1)
-    held = int(np.gcd.reduce(np.diff(changed)))
-    held = held if held <= _MOST_HELD else 1
-    return slice(int(changed[0]) % held, None, held)
+    rows = slice(0, None, 1)
+    for column in columns:
+        known = np.flatnonzero(np.isfinite(column))
+        changed = known[1:][np.diff(column[known]) != 0.0]
+        if len(changed) >= _FEWEST_CHANGES:
+            held = int(np.gcd.reduce(np.diff(changed)))
+            if rows.step < held <= _MOST_HELD:
+                rows = slice(int(changed[0]) % held, None, held)
+    return rows
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:

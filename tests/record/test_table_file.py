@@ -110,11 +110,13 @@ def test_rows_that_only_repeat_a_position_are_left_out(tmp_path: Path, first: in
     assert (report["samples"], report["lost_samples"]) == (len(samples), 0)
 
 
+@pytest.mark.process
 def test_a_column_of_an_expression_may_only_repeat_its_position(tmp_path: Path) -> None:
     """An even feed is no stick-slip where its encoder comes over a slow bus."""
-    time = np.arange(4000.0) / 1000.0
-    path = csv_of(tmp_path / "log.csv", t=time, x=0.01 * np.repeat(time[::50], 50), c=0.01 * time)
-    report = report_of_recording(path, {"time": "t", "position": "c-x"}, belt_speed=0.01)
+    time, path = np.arange(4000.0) / 1000.0, tmp_path / "log.npz"
+    columns = {"x": 0.01 * np.repeat(time[::50], 50), "c": 0.01 * time, "scale": np.ones(1)}
+    np.savez(path, t=np.where(time > 0.0, time, np.nan), **columns)
+    report = report_of_recording(path, {"time": "t", "position": "c-x*scale"}, belt_speed=0.01)
     assert report["regime"] in ("equilibrium", "held")
     assert any("changes only every 50 rows" in note for note in report["notes"])
 
