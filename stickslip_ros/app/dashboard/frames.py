@@ -23,6 +23,8 @@ PERIODS = (10, 50, 200)
 """Selectable lengths of the traces, in natural periods."""
 
 _QUANTITIES = [quantities_of(Trajectory)[n] for n in ("position", "velocity", "control_force")]
+_KEPT_PERIODS = 1.25 * PERIODS[-1]
+"""A page requests the samples of its last frame a little after that frame."""
 _UNKNOWN_PERIOD = 1.0
 _LEAST_SPAN = 1e-3
 """Least length of an axis, relative to the largest value that the drive lets expect."""
@@ -36,7 +38,7 @@ class Frames:
 
     def __init__(self, run: RunState) -> None:
         self._run = run
-        self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
+        self._trace = LiveTrace(_KEPT_PERIODS * _UNKNOWN_PERIOD)
 
     @property
     def period(self) -> float:
@@ -49,7 +51,7 @@ class Frames:
 
     def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
         """Add received states, forces sent, and forces that were dropped."""
-        self._trace.longest = PERIODS[-1] * self.period
+        self._trace.longest = _KEPT_PERIODS * self.period
         self._trace.feed(states, forces, dropped)
 
     def table(self, periods: int, end: float) -> str:

@@ -372,7 +372,15 @@ function save(url, name) {
   link.click();
 }
 
+const blobOf = async (url) => {
+  const answer = await fetch(url);
+  return answer.ok ? URL.createObjectURL(await answer.blob()) : null;
+};
+
 const shownRows = () => `/shown.csv?periods=${page.periods}&end=${page.motion?.end ?? 0}`;
+
+// Fetches the samples of a paused view, since the server forgets old ones and ends.
+const keepRows = () => (page.rows ??= blobOf(shownRows()));
 
 page.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
 page.show = (periods) => {
@@ -384,6 +392,8 @@ page.keep = (name) => {
 };
 page.pause = (paused) => {
   page.paused = paused;
+  if (paused) keepRows();
+  else page.rows = null;
   show(paused);
 };
 page.describe = (run, bag, settings) => {
@@ -392,7 +402,7 @@ page.describe = (run, bag, settings) => {
 };
 const now = () => `${new Date().toISOString().slice(0, 19)}Z`;
 const fileName = (ending, what = "") => `${page.name} ${what} ${now()}`.replace(/[^\w.+-]+/g, "_") + ending;
-page.csv = () => save(page.rows ?? shownRows(), fileName(".csv"));
+page.csv = async () => save((await page.rows) ?? shownRows(), fileName(".csv"));
 
 // Saves one chart as a picture.
 page.picture = (chart) => {
@@ -424,11 +434,6 @@ page.png = () => {
   save(picture.toDataURL("image/png"), fileName(".png"));
 };
 
-const blobOf = async (url) => {
-  const answer = await fetch(url);
-  return answer.ok ? URL.createObjectURL(await answer.blob()) : null;
-};
-
 // Fetches what the page offers, before the server ends.
 page.end = async () => {
   page.final = true;
@@ -436,7 +441,7 @@ page.end = async () => {
   const link = document.querySelector('a[href="/bag.mcap"]');
   const bag = link && (await blobOf("/bag.mcap"));
   if (bag) link.href = bag;
-  page.rows = await blobOf(shownRows());
+  await keepRows();
   return true;
 };
 page.copy = ({ currentTarget }) => navigator.clipboard.writeText(currentTarget.previousElementSibling.textContent);

@@ -323,6 +323,7 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     page.wait_for_function("stickslip.motion.window > 12")  # s: a period takes 63 ms
     wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
     page.get_by_role("button", name="Pause view").click()
+    page.get_by_text("10 periods", exact=True).click()  # for when the view continues
     row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
     expect(row).to_contain_text("stick-slip")
     expect(row).to_contain_text("steady sliding")
