@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.measures.noise import NOISE_SAMPLES, encoder_step
 from stickslip_ros.record.expressions import Expression, listed
 from stickslip_ros.record.table_clock import (
     Clock,
@@ -30,7 +31,12 @@ _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
 _FEWEST_CHANGES, _MOST_HELD = 16, 100
-"""Number of changes of a column from which it is known to be held; most rows for which it is."""
+"""Number of changes, or bends, of a column from which it is known to be held, or interpolated; most
+rows for which it is."""
+_ROUNDED_STEPS, _ROUNDED_SHARE, _USUAL = 2.5, 1e-3, 0.6
+"""Largest bend that may be rounding, in steps of a column (a rounded line has bends of two), and as
+a share of the largest bend; share of the bends that follow each other at once in a column that is
+interpolated, and is not one of few corners."""
 
 
 class Quantities(NamedTuple):
@@ -80,13 +86,14 @@ def quantities_of(
     if needed == "position":
         places = asked[needed].places if clocks[needed] == clock else ()
         every = [np.asarray(cells.columns[place], float) for place in places]
-        held = _held([picked(column, rows) for column in every if len(column) > 1])
-        if held.step > 1:
-            own = np.full(len(time), nan)
-            own[held] = values["position"][held]
-            values["position"] = own
+        own = _updated([picked(column, rows) for column in every if len(column) > 1])
+        if own.step > 1:
+            position = np.full(len(time), nan)
+            position[own] = values["position"][own]
+            values["position"] = position
             cells.notes.append(
-                f"the position changes only every {held.step} rows: those between are left out"
+                f"the position is updated only every {own.step} rows: those between repeat it, or "
+                "lie on lines, and are left out"
             )
         return Quantities(values, [*cells.notes, *without_faults(cells, values, rows)])
     at, velocity = values["time"][present], values["velocity"][present]
@@ -97,20 +104,26 @@ def quantities_of(
     return Quantities(values, cells.notes)
 
 
-def _held(columns: Iterable[FloatArray]) -> slice:
+def _updated(columns: Iterable[FloatArray]) -> slice:
     """Return the rows at which the column that is updated least often has a value of its own.
 
-    A column that is recorded faster than it is updated repeats its values: all its changes are a
-    multiple of the same number of rows apart.
+    A column that is recorded faster than it is updated repeats its values, or lies on lines between
+    them: all its changes, or bends, are a multiple of the same number of rows apart.
     """
     rows = slice(0, None, 1)
     for column in columns:
         known = np.flatnonzero(np.isfinite(column))
-        changed = known[1:][np.diff(column[known]) != 0.0]
-        if len(changed) >= _FEWEST_CHANGES:
-            held = int(np.gcd.reduce(np.diff(changed)))
-            if rows.step < held <= _MOST_HELD:
-                rows = slice(int(changed[0]) % held, None, held)
+        value = column[known]
+        bends = np.abs(np.diff(value, 2))
+        rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
+        rounding = max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0))
+        for changes, share in ((np.diff(value) != 0.0, 0.0), (bends > rounding, _USUAL)):
+            changed = known[1 : 1 + len(changes)][changes]
+            if len(changed) >= _FEWEST_CHANGES:
+                apart = np.diff(changed)
+                every = int(np.gcd.reduce(apart))
+                if rows.step < every <= _MOST_HELD and np.mean(apart == every) >= share:
+                    rows = slice(int(changed[0]) % every, None, every)
     return rows
 
 
