@@ -1,11 +1,15 @@
-"""Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be."""
+"""Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be.
 
+Also rows between which a sensor had no new value.
+"""
+
+from collections.abc import Iterable
 from math import pi
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms, windows
-from stickslip_ros.measures.noise import PRECISION, white_noise
+from stickslip_ros.measures.noise import NOISE_SAMPLES, PRECISION, encoder_step, white_noise
 from stickslip_ros.text import quantity
 
 _STEEPER = 10.0
@@ -28,6 +32,13 @@ _RATIO, _CORRELATION, _LATE_SHARE, _UNKNOWN_SHARE = 1.4, 0.7, 0.03, 0.1
 """Ratio of displacements to velocities from which these are in another unit; least correlation of
 the two; share of the displacements that a delay makes, from which a velocity is late; share of
 them by which the motion between the velocities is unknown."""
+_FEWEST_CHANGES, _MOST_HELD = 16, 100
+"""Number of changes, or bends, of a column from which it is known to be held, or interpolated; most
+rows for which it is."""
+_ROUNDED_STEPS, _ROUNDED_SHARE, _USUAL = 2.5, 1e-3, 0.6
+"""Largest bend that may be rounding, in steps of a column (a rounded line has bends of two), and as
+a share of the largest bend; share of the bends that follow each other at once in a column that is
+interpolated, and is not one of few corners."""
 
 
 class Jumps:
@@ -123,6 +134,29 @@ def shift_note(size: float, place: str, unit: str = "m") -> str:
         f"the position jumps by {quantity(float(f'{size:.3g}'), unit)}, {place}, and does not come "
         "back, as after a new zero or lost counts: --to or --from takes one side"
     )
+
+
+def updated(columns: Iterable[FloatArray]) -> slice:
+    """Return the rows at which the column that is updated least often has a value of its own.
+
+    A column that is recorded faster than it is updated repeats its values, or lies on lines between
+    them: all its changes, or bends, are a multiple of the same number of rows apart.
+    """
+    rows = slice(0, None, 1)
+    for column in columns:
+        known = np.flatnonzero(np.isfinite(column))
+        value = column[known]
+        bends = np.abs(np.diff(value, 2))
+        rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
+        rounding = max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0))
+        for changes, share in ((np.diff(value) != 0.0, 0.0), (bends > rounding, _USUAL)):
+            changed = known[1 : 1 + len(changes)][changes]
+            if len(changed) >= _FEWEST_CHANGES:
+                apart = np.diff(changed)
+                every = int(np.gcd.reduce(apart))
+                if rows.step < every <= _MOST_HELD and np.mean(apart == every) >= share:
+                    rows = slice(int(changed[0]) % every, None, every)
+    return rows
 
 
 def lost_velocities(

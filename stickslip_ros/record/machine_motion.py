@@ -16,6 +16,7 @@ from stickslip_ros.record.faults import (
     differences,
     lost_velocities,
     shift_note,
+    updated,
 )
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -94,17 +95,25 @@ class MachineMotion:
                 forces = forces[:0]
             return self._completed(samples), forces
 
-    def without_lost_velocities(self, samples: SampleColumns) -> SampleColumns:
-        """Return all samples with velocities that agree with the positions."""
-        if self._recorded != (True, True) or self.estimated:
+    def whole(self, samples: SampleColumns) -> SampleColumns:
+        """Return the updated ones of all samples, with velocities that agree with the positions."""
+        if self._recorded is None or not self._recorded[0]:
+            return samples
+        rows = updated([samples.position])
+        if rows.step > 1:
+            why = f"lie between updates of the position, which one in {rows.step} has,"
+            self._left_out[why] += len(samples) - len(samples[rows])
+            samples = samples[rows]
+        elif self.estimated:
             return samples
         valid = np.flatnonzero(samples.is_valid)
         time = (samples.stamp[valid] - samples.stamp[:1]) / NANOSECONDS
         position, recorded = samples.position[valid], samples.velocity[valid]
-        fault, spikes = lost_velocities(time, position, recorded)
-        velocity = samples.velocity.copy()
-        if fault is not None:
-            self._fault = fault
+        velocity, spikes = samples.velocity.copy(), np.empty(0, np.bool_)
+        if not self.estimated:
+            fault, spikes = lost_velocities(time, position, recorded)
+            self._fault = fault or ""
+        if self.estimated:
             velocity[valid] = differences(time, position)
         elif spikes.any():
             why = "have a velocity that jumps away and back, as the positions do not,"

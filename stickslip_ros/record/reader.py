@@ -316,7 +316,7 @@ class _RunReader:
         if gathered:
             run = RunBlock(*_joined(gathered))
             if (machine := self._motion.machine) is not None:
-                states = machine.without_lost_velocities(run.joint_states)
+                states = machine.whole(run.joint_states)
                 run = RunBlock(states, *run[1:3], True, machine.estimated)
             yield run
 

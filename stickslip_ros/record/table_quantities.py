@@ -1,6 +1,6 @@
 """Quantities of a run in the columns of a table, all at the times of its positions."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import nan
 from typing import NamedTuple
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.measures.noise import NOISE_SAMPLES, encoder_step
 from stickslip_ros.record.expressions import Expression, listed
+from stickslip_ros.record.faults import updated
 from stickslip_ros.record.table_clock import (
     Clock,
     Rows,
@@ -30,13 +30,6 @@ from stickslip_ros.text import must_be_one_of
 _MERGED_SHARE, _BETWEEN_SHARE = 0.3, 0.05
 """Share of the rows with a position that lack another quantity, from which it was recorded between
 them; fewest of its values, as a share of the positions."""
-_FEWEST_CHANGES, _MOST_HELD = 16, 100
-"""Number of changes, or bends, of a column from which it is known to be held, or interpolated; most
-rows for which it is."""
-_ROUNDED_STEPS, _ROUNDED_SHARE, _USUAL = 2.5, 1e-3, 0.6
-"""Largest bend that may be rounding, in steps of a column (a rounded line has bends of two), and as
-a share of the largest bend; share of the bends that follow each other at once in a column that is
-interpolated, and is not one of few corners."""
 
 
 class Quantities(NamedTuple):
@@ -86,7 +79,7 @@ def quantities_of(
     if needed == "position":
         places = asked[needed].places if clocks[needed] == clock else ()
         every = [np.asarray(cells.columns[place], float) for place in places]
-        own = _updated([picked(column, rows) for column in every if len(column) > 1])
+        own = updated([picked(column, rows) for column in every if len(column) > 1])
         if own.step > 1:
             position = np.full(len(time), nan)
             position[own] = values["position"][own]
@@ -102,29 +95,6 @@ def quantities_of(
     values["position"][present] = moved
     cells.notes.append("the position is not recorded: it is the integral of the velocity")
     return Quantities(values, cells.notes)
-
-
-def _updated(columns: Iterable[FloatArray]) -> slice:
-    """Return the rows at which the column that is updated least often has a value of its own.
-
-    A column that is recorded faster than it is updated repeats its values, or lies on lines between
-    them: all its changes, or bends, are a multiple of the same number of rows apart.
-    """
-    rows = slice(0, None, 1)
-    for column in columns:
-        known = np.flatnonzero(np.isfinite(column))
-        value = column[known]
-        bends = np.abs(np.diff(value, 2))
-        rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
-        rounding = max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0))
-        for changes, share in ((np.diff(value) != 0.0, 0.0), (bends > rounding, _USUAL)):
-            changed = known[1 : 1 + len(changes)][changes]
-            if len(changed) >= _FEWEST_CHANGES:
-                apart = np.diff(changed)
-                every = int(np.gcd.reduce(apart))
-                if rows.step < every <= _MOST_HELD and np.mean(apart == every) >= share:
-                    rows = slice(int(changed[0]) % every, None, every)
-    return rows
 
 
 def speed_and_force(table: Table, columns: Mapping[str, str]) -> Quantities:
