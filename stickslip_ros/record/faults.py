@@ -1,7 +1,4 @@
-"""Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be.
-
-Also rows between which a sensor had no new value.
-"""
+"""Faults of recordings: dropouts, wraps, rows without an update, and velocities that cannot be."""
 
 from collections.abc import Iterable
 from math import pi
@@ -146,10 +143,12 @@ def updated(columns: Iterable[FloatArray]) -> slice:
     for column in columns:
         known = np.flatnonzero(np.isfinite(column))
         value = column[known]
-        bends = np.abs(np.diff(value, 2))
+        with np.errstate(over="ignore", invalid="ignore"):
+            steps = np.diff(value)
+            bends = np.abs(np.diff(steps))
         rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
         rounding = max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0))
-        for changes, share in ((np.diff(value) != 0.0, 0.0), (bends > rounding, _USUAL)):
+        for changes, share in ((steps != 0.0, 0.0), (bends > rounding, _USUAL)):
             changed = known[1 : 1 + len(changes)][changes]
             if len(changed) >= _FEWEST_CHANGES:
                 apart = np.diff(changed)
