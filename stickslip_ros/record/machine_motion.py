@@ -99,11 +99,11 @@ class MachineMotion:
         """Return the updated ones of all samples, with velocities that agree with the positions."""
         if self._recorded is None or not self._recorded[0]:
             return samples
-        rows = updated([samples.position])
-        if rows.step > 1:
-            why = f"lie between updates of the position, which one in {rows.step} has,"
-            self._left_out[why] += len(samples) - len(samples[rows])
-            samples = samples[rows]
+        every, own = updated(samples.stamp, [samples.position])
+        if every > 1:
+            why = f"lie between updates of the position, which one in {every} has,"
+            self._left_out[why] += int(np.count_nonzero(~own))
+            samples = samples[own]
         elif self.estimated:
             return samples
         valid = np.flatnonzero(samples.is_valid)

@@ -79,13 +79,12 @@ def quantities_of(
     if needed == "position":
         places = asked[needed].places if clocks[needed] == clock else ()
         every = [np.asarray(cells.columns[place], float) for place in places]
-        own = updated([picked(column, rows) for column in every if len(column) > 1])
-        if own.step > 1:
-            position = np.full(len(time), nan)
-            position[own] = values["position"][own]
-            values["position"] = position
+        columns_at = [picked(column, rows) for column in every if len(column) > 1]
+        period, own = updated(values["time"], columns_at)
+        if period > 1:
+            values["position"] = np.where(own, values["position"], nan)
             cells.notes.append(
-                f"the position is updated only every {own.step} rows: those between repeat it, or "
+                f"the position is updated only every {period} rows: those between repeat it, or "
                 "lie on lines, and are left out"
             )
         return Quantities(values, [*cells.notes, *without_faults(cells, values, rows)])

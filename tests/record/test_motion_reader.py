@@ -191,10 +191,11 @@ def test_what_jumps_away_and_back_is_of_another_source(tmp_path: Path, every: in
 
 
 def test_joint_states_between_updates_of_the_position_are_left_out(tmp_path: Path) -> None:
-    write_bag(tmp_path / "bag", [axis(i, POSITION[i - i % 5].item(), []) for i in range(300)])
-    run = ss.read_bag(tmp_path / "bag")
-    assert np.array_equal(run.samples.position, POSITION[::5])
-    assert run.samples.velocity[1:-1] == pytest.approx(VELOCITY[5:-5:5], abs=1e-4)
+    sent = np.array([i for i in range(300) if i % 70])  # others are lost
+    write_bag(tmp_path / "bag", [axis(i, POSITION[i - i % 5].item(), []) for i in sent.tolist()])
+    run, rows = ss.read_bag(tmp_path / "bag"), sent[sent % 5 == 0]
+    assert np.array_equal(run.samples.position, POSITION[rows])
+    assert run.samples.velocity[1:-1] == pytest.approx(VELOCITY[rows[1:-1]], abs=5e-3)
     assert f"240 joint states on {STATES} lie between updates" in run.report["notes"][0]
 
 
