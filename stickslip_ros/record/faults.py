@@ -1,12 +1,11 @@
-"""Faults of recordings: dropouts, wraps, rows without an update, and velocities that cannot be."""
+"""Faults of sensors that a recording shows: dropouts, wraps, and velocities that cannot be."""
 
-from collections.abc import Iterable
 from math import pi
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, rms, windows
-from stickslip_ros.measures.noise import NOISE_SAMPLES, PRECISION, encoder_step, white_noise
+from stickslip_ros.measures.noise import PRECISION, white_noise
 from stickslip_ros.text import quantity
 
 _STEEPER = 10.0
@@ -29,15 +28,6 @@ _RATIO, _CORRELATION, _LATE_SHARE, _UNKNOWN_SHARE = 1.4, 0.7, 0.03, 0.1
 """Ratio of displacements to velocities from which these are in another unit; least correlation of
 the two; share of the displacements that a delay makes, from which a velocity is late; share of
 them by which the motion between the velocities is unknown."""
-_FEWEST_CHANGES, _MOST_HELD, _JUDGED = 16, 100, 32_768
-"""Number of changes, or bends, of a column from which it is known to be held, or interpolated; most
-rows for which it is; number of rows by which this is judged."""
-_ROUNDED_STEPS, _ROUNDED_SHARE = 2.5, 1e-3
-"""Largest bend that may be rounding, in steps of a column (a rounded line has bends of two), and as
-a share of the largest bend."""
-_USUAL, _RARE = 0.6, 0.1
-"""Share of the bends that follow each other at once in a column that is interpolated, and is not
-one of few corners; share of the changes that may be late, as where rows are missing."""
 
 
 class Jumps:
@@ -133,58 +123,6 @@ def shift_note(size: float, place: str, unit: str = "m") -> str:
         f"the position jumps by {quantity(float(f'{size:.3g}'), unit)}, {place}, and does not come "
         "back, as after a new zero or lost counts: --to or --from takes one side"
     )
-
-
-def updated(time: FloatArray | IntArray, columns: Iterable[FloatArray]) -> tuple[int, BoolArray]:
-    """Return the sample periods from update to update, and at which rows there is one.
-
-    It is that of the column that is updated least often. One that is recorded faster than it is
-    updated repeats its values, or lies on lines between them: its changes, or bends, are multiples
-    of some sample periods apart. Rows may be missing; `time` is that of each, in any unit.
-    """
-    every, own = 1, np.ones(len(time), np.bool_)
-    for column in columns:
-        rows = np.flatnonzero(np.isfinite(column))
-        moving = np.flatnonzero(column[rows[1:]] != column[rows[:-1]])
-        if len(moving) < _FEWEST_CHANGES:
-            continue
-        middle = int(moving[len(moving) // 2])
-        rows = rows[max(middle - _JUDGED // 2, 0) : middle + _JUDGED // 2]
-        number, value = _numbered(time[rows]), column[rows]
-        with np.errstate(over="ignore", invalid="ignore"):
-            moves = np.diff(value)
-            bends = np.abs(np.diff(moves / np.maximum(np.diff(number), 1)))
-        rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
-        rounding = max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0))
-        for changes, share in ((moves != 0.0, 0.0), (bends > rounding, _USUAL)):
-            changed = np.flatnonzero(changes) + 1
-            period, phase = _period_of(number[changed], share)
-            if period > every:
-                update = rows[changed[number[changed] % period == phase][0]]
-                every, since = period, _numbered(time)
-                own = (since - since[update]) % period == 0
-    return every, own
-
-
-def _numbered(time: FloatArray | IntArray) -> IntArray:
-    """Return the number of sample periods from the first row to each."""
-    steps = np.diff(time)
-    return np.cumsum(np.append(0, np.rint(steps / (np.median(steps) or 1)))).astype(np.int64)
-
-
-def _period_of(changed: IntArray, share: float) -> tuple[int, int]:
-    """Return the period and the phase of most changes, some of them one period apart; or 1 and 0.
-
-    These are at least a `share` of the changes.
-    """
-    if len(changed) >= _FEWEST_CHANGES:
-        apart, count = np.unique(np.diff(changed), return_counts=True)
-        period = int(np.gcd.reduce(apart[count > _RARE * len(changed)]))
-        if 1 < period <= _MOST_HELD and count[apart == period].sum() >= share * len(changed):
-            number = np.bincount(changed % period)
-            if number.max() > (1.0 - _RARE) * len(changed):
-                return period, int(number.argmax())
-    return 1, 0
 
 
 def lost_velocities(

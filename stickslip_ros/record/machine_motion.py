@@ -16,8 +16,8 @@ from stickslip_ros.record.faults import (
     differences,
     lost_velocities,
     shift_note,
-    updated,
 )
+from stickslip_ros.record.updates import updated
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable, quantity
@@ -101,7 +101,7 @@ class MachineMotion:
             return samples
         every, own = updated(samples.stamp, [samples.position])
         if every > 1:
-            why = f"lie between updates of the position, which one in {every} has,"
+            why = f"lie between updates of the position, one in {every:.3g},"
             self._left_out[why] += int(np.count_nonzero(~own))
             samples = samples[own]
         elif self.estimated:

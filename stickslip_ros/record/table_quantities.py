@@ -9,7 +9,6 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.record.expressions import Expression, listed
-from stickslip_ros.record.faults import updated
 from stickslip_ros.record.table_clock import (
     Clock,
     Rows,
@@ -24,6 +23,7 @@ from stickslip_ros.record.table_clock import (
 from stickslip_ros.record.table_columns import ROW, Table
 from stickslip_ros.record.table_faults import Values, without_faults
 from stickslip_ros.record.table_units import FORCES, MOTION, QUANTITIES, Cells
+from stickslip_ros.record.updates import updated
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import must_be_one_of
 
@@ -84,7 +84,7 @@ def quantities_of(
         if period > 1:
             values["position"] = np.where(own, values["position"], nan)
             cells.notes.append(
-                f"the position is updated only every {period} rows: those between repeat it, or "
+                f"the position is updated only every {period:.3g} rows: those between repeat it or "
                 "lie on lines, and are left out"
             )
         return Quantities(values, [*cells.notes, *without_faults(cells, values, rows)])

@@ -191,12 +191,12 @@ def test_what_jumps_away_and_back_is_of_another_source(tmp_path: Path, every: in
 
 
 def test_joint_states_between_updates_of_the_position_are_left_out(tmp_path: Path) -> None:
-    sent = np.array([i for i in range(300) if i % 70])  # others are lost
-    write_bag(tmp_path / "bag", [axis(i, POSITION[i - i % 5].item(), []) for i in sent.tolist()])
-    run, rows = ss.read_bag(tmp_path / "bag"), sent[sent % 5 == 0]
-    assert np.array_equal(run.samples.position, POSITION[rows])
-    assert run.samples.velocity[1:-1] == pytest.approx(VELOCITY[rows[1:-1]], abs=5e-3)
-    assert f"240 joint states on {STATES} lie between updates" in run.report["notes"][0]
+    sent = [i for i in range(300) if i % 70]  # of an update that is lost the next one tells
+    write_bag(tmp_path / "bag", [axis(i, POSITION[i - i % 5].item(), []) for i in sent])
+    run = ss.read_bag(tmp_path / "bag")
+    assert np.array_equal(run.samples.position, POSITION[5::5])
+    assert run.samples.velocity[1:-1] == pytest.approx(VELOCITY[10:-5:5], abs=0.02)
+    assert f"236 joint states on {STATES} lie between updates" in run.report["notes"][0]
 
 
 def test_a_belt_may_have_messages_of_its_own(tmp_path: Path) -> None:
