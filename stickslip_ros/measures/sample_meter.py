@@ -45,8 +45,9 @@ _EDGE_ERROR = 0.03
 """Standard error of the stick of a cycle of exact samples, in sample periods: its edges are
 interpolated, and the rounding is alike in all cycles."""
 
-_MOST_HIDDEN = 0.05
-"""Standard error of a stick fraction of 0 above which a note tells what may be hidden."""
+_MOST_HIDDEN, _BETWEEN_SAMPLES = 0.05, 0.3
+"""Standard error of a stick fraction of 0 above which a note tells what may be hidden; that of an
+amplitude, in amplitudes, of slips between two samples."""
 
 _FEW_STRAYS, _STRAY_SHARE = 10, 0.01
 """Number and share of samples off the grid of the plant up to which it may have been restarted."""
@@ -286,7 +287,13 @@ class SampleMeter:
                 f"the amplitude is only {measures.amplitude / self.step:.2g} steps of the encoder: "
                 "the standard errors are not known"
             )
-        hidden = (measures.errors or {}).get("stick_fraction", 0.0)
+        errors = measures.errors or {}
+        if errors.get("amplitude", 0.0) > _BETWEEN_SAMPLES * (measures.amplitude or 0.0):
+            yield (
+                "the slips last for about one sample: the amplitude has a large error, and "
+                "positions that are held between updates look the same"
+            )
+        hidden = errors.get("stick_fraction", 0.0)
         if measures.regime is Regime.PURE_SLIP and hidden > _MOST_HIDDEN:
             yield f"noise or few samples may hide sticks of up to {2.0 * hidden:.0%} of a cycle"
         if measures.regime is None and measures.period is not None:

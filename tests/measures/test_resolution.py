@@ -180,6 +180,14 @@ def test_motion_that_the_spectrum_shows_is_motion_under_large_noise() -> None:
     assert found.period == pytest.approx(truth.period, rel=0.005)
 
 
+def test_slips_of_one_sample_may_be_positions_that_are_held() -> None:
+    position = 0.04 * (1e-3 * np.arange(4000) % 0.2)
+    position += 1e-6 * np.random.default_rng(0).standard_normal(4000)
+    told = fed(columns(milliseconds(4000), position), NOISY).measured()
+    assert told.measures.regime is Regime.STICK_SLIP
+    assert any("positions that are held between updates look the same" in n for n in told.notes)
+
+
 def test_the_spectrum_shows_a_motion_and_no_noise() -> None:
     signal = np.sin(2.0 * np.pi * np.arange(2000) / 7.3)
     noise = np.random.default_rng(0).standard_normal(2000)

@@ -96,27 +96,15 @@ def test_times_that_repeat_and_velocities_that_are_missing_are_noted(tmp_path: P
         assert note in recording.notes
 
 
-def test_rows_between_updates_are_left_out(tmp_path: Path) -> None:
-    """A trace is often faster than what it records."""
-    shown = np.repeat(POSITION[::4], 4)[: len(TIME)]
-    path = csv_of(tmp_path / "log.csv", t=TIME[2:], x=shown[2:])
-    recording = read_table(path, {"time": "t", "position": "x"})
-    samples = recording.samples[recording.samples.is_valid]
-    assert samples.position.tolist() == shown[4::4].tolist()
-    assert set(np.diff(samples.stamp)) == {4_000_000}
-    assert any("updated only every 4 rows" in note for note in recording.notes)
-    report = report_of_recording(path, {"time": "t", "position": "x"})
-    assert (report["samples"], report["lost_samples"]) == (len(samples), 0)
-
-
 @pytest.mark.process
-def test_a_column_of_an_expression_may_only_repeat_its_position(tmp_path: Path) -> None:
+def test_rows_between_updates_of_a_column_are_left_out(tmp_path: Path) -> None:
     """An even feed is no stick-slip where its encoder comes over a slow bus."""
     time, path = np.arange(4000.0) / 1000.0, tmp_path / "log.npz"
     columns = {"x": 0.01 * np.repeat(time[::50], 50), "c": 0.01 * time, "scale": np.ones(1)}
     np.savez(path, t=np.where(time > 0.0, time, np.nan), **columns)
     report = report_of_recording(path, {"time": "t", "position": "c-x*scale"}, belt_speed=0.01)
     assert report["regime"] in ("equilibrium", "held")
+    assert (report["samples"], report["lost_samples"]) == (79, 0)
     assert any("updated only every 50 rows" in note for note in report["notes"])
 
 
