@@ -76,7 +76,7 @@ def _period_of(updates: IntArray) -> float:
     if len(updates) < _FEWEST:
         return 1.0
     apart = np.diff(updates)
-    usual = apart[np.abs(apart - np.median(apart)) <= 1.0]
+    usual = apart[np.abs(apart - np.sort(apart)[len(apart) // 2]) <= 1]
     period = float(usual.mean())
     even = np.mean(np.abs(apart - period) < 1.0) >= _USUAL
     few = np.mean(apart <= period - 1.0) <= _RARE
