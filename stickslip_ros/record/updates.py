@@ -3,7 +3,7 @@
 Between updates a recorder repeats the last value, or puts the rows on a line to the next one.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,14 +15,16 @@ _FEWEST, _MOST_ROWS, _JUDGED = 16, 100, 32_768
 _USUAL, _RARE = 0.6, 0.1
 """Share of the updates that follow the one before after one period, within a row; share that comes
 sooner, as where rows are missing."""
-_ROUNDED_STEPS, _ROUNDED_SHARE = 2.5, 1e-3
-"""Largest bend of a line by rounding, in steps of the values and as a share of the largest bend."""
+_ROUNDED_STEPS, _ROUNDED_SHARE, _ONE_STEP = 2.5, 1e-3, 1.5
+"""Largest bend of a line by rounding, in steps of the values and as a share of the largest bend;
+steps of the values below which a change is a single one."""
 
 
-def updated(time: FloatArray | IntArray, columns: Iterable[FloatArray]) -> tuple[float, BoolArray]:
+def updated(time: FloatArray | IntArray, columns: Sequence[FloatArray]) -> tuple[float, BoolArray]:
     """Return the sample periods from update to update, and at which rows there is one.
 
-    It is that of the column that is updated least often; 1 if each row is an update. Rows may be
+    It is that of the column that is updated least often; 1 if each row is an update. Of a column
+    alone, single steps of an encoder are no updates: they are seen as what they are. Rows may be
     missing; `time` is that of each, in any unit.
     """
     every, own = 1.0, np.ones(len(time), np.bool_)
@@ -33,13 +35,15 @@ def updated(time: FloatArray | IntArray, columns: Iterable[FloatArray]) -> tuple
             continue
         middle = int(moving[len(moving) // 2])
         part = rows[max(middle - _JUDGED // 2, 0) : middle + _JUDGED // 2]
+        number, value = _numbered(time[part]), column[part]
+        if len(columns) == 1 and _is_coarse(value):
+            continue
         for updates_in in (_changes, _knots):
-            number = _numbered(time[part])
-            period = _period_of(number[updates_in(number, column[part])])
+            period = _period_of(number[updates_in(number, value)])
             if period > every:
-                number = _numbered(time)
-                at = number[rows[updates_in(number[rows], column[rows])]]
-                every, own = period, np.isin(number, _filled(at, period, int(number[-1])))
+                every, whole = period, _numbered(time)
+                at = whole[rows[updates_in(whole[rows], column[rows])]]
+                own = np.isin(whole, _filled(at, period, int(whole[-1])))
     return every, own
 
 
@@ -47,6 +51,14 @@ def _numbered(time: FloatArray | IntArray) -> IntArray:
     """Return the number of sample periods from the first row to each."""
     steps = np.diff(time)
     return np.cumsum(np.append(0, np.rint(steps / (np.median(steps) or 1)))).astype(np.int64)
+
+
+def _is_coarse(value: FloatArray) -> bool:
+    """Return whether a value changes by single steps."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        changes = np.abs(np.diff(value))
+    usual = np.median(changes[changes > 0.0])
+    return bool(usual < _ONE_STEP * encoder_step(value[-NOISE_SAMPLES:]))
 
 
 def _changes(number: IntArray, value: FloatArray) -> IntArray:
@@ -61,14 +73,11 @@ def _knots(number: IntArray, value: FloatArray) -> IntArray:
     rounding = _ROUNDED_STEPS * encoder_step(value[-NOISE_SAMPLES:])
     bent = np.flatnonzero(bends > max(rounding, _ROUNDED_SHARE * bends.max(initial=0.0)))
     # A line that ends between two rows bends at both of them.
-    first = np.flatnonzero(np.diff(bent, prepend=-2) > 1)
+    first = bent[np.diff(bent, prepend=-2) > 1]
     if len(bent) > 2.0 * (1.0 + _RARE) * len(first):
         return bent[:0]
-    second = np.minimum(first + 1, len(bent) - 1)
-    both = bent[second] == bent[first] + 1
-    return (
-        np.where(both & (bends[bent[second]] > bends[bent[first]]), bent[second], bent[first]) + 1
-    )
+    second = np.minimum(first + 1, len(bends) - 1)
+    return np.where(bends[second] > bends[first], second, first) + 1
 
 
 def _period_of(updates: IntArray) -> float:
