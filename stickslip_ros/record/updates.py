@@ -48,9 +48,10 @@ def updated(time: FloatArray | IntArray, columns: Sequence[FloatArray]) -> tuple
 
 
 def _numbered(time: FloatArray | IntArray) -> IntArray:
-    """Return the number of sample periods from the first row to each."""
+    """Return the number of sample periods from the first row to each; of a long pause, a few."""
     steps = np.diff(time)
-    return np.cumsum(np.append(0, np.rint(steps / (np.median(steps) or 1)))).astype(np.int64)
+    periods = np.clip(np.rint(steps / (np.median(steps) or 1)), -_MOST_ROWS, _MOST_ROWS)
+    return np.cumsum(np.append(0, periods)).astype(np.int64)
 
 
 def _is_coarse(value: FloatArray) -> bool:
