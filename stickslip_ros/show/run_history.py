@@ -98,8 +98,9 @@ class Trace:
                 self._thin()
 
     def forget(self, end: float) -> None:
-        """Remove the rows before a time once they are half of all rows."""
+        """Remove rows before a time, but none of the last 50,000, once they are half of all."""
         first = int(np.searchsorted(self._kept[0][: self._size], end))
+        first = min(first, self._size - self._LAST_ROWS)
         if 2 * first > self._size:
             self._thinned = max(self._thinned - first, 0)
             self._keep(slice(first, self._size), 2 * (self._size - first))

@@ -183,6 +183,7 @@ def test_the_end_of_a_trace_is_not_thinned() -> None:
 def test_what_is_old_is_forgotten_and_nothing_else() -> None:
     time, *columns = noise(30_000)
     trace = Trace(2)
+    trace._LAST_ROWS = 3_000
     for start in range(0, len(time), 1000):
         trace.add(*(column[start : start + 1000] for column in (time, *columns)))
         trace.forget(time[start] - 5.0)
