@@ -15,7 +15,7 @@ from stickslip_ros.motion.trajectory import Trajectory
 from stickslip_ros.quantities import quantities_of
 from stickslip_ros.record.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
-from stickslip_ros.show.live_trace import Line, LiveTrace
+from stickslip_ros.show.live_trace import Line
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -24,7 +24,10 @@ PERIODS = (10, 50, 200)
 
 _QUANTITIES = [quantities_of(Trajectory)[n] for n in ("position", "velocity", "control_force")]
 _KEPT_PERIODS = 1.25 * PERIODS[-1]
-"""A page requests the samples of its last frame a little after that frame."""
+"""A page requests the samples of its last frame a little after that frame.
+
+In lockstep the last 50,000 rows, which are always kept, are the longer time.
+"""
 _UNKNOWN_PERIOD = 1.0
 _LEAST_SPAN = 1e-3
 """Least length of an axis, relative to the largest value that the drive lets expect."""
@@ -38,7 +41,6 @@ class Frames:
 
     def __init__(self, run: RunState) -> None:
         self._run = run
-        self._trace = LiveTrace(_KEPT_PERIODS * _UNKNOWN_PERIOD)
 
     @property
     def period(self) -> float:
@@ -51,19 +53,19 @@ class Frames:
 
     def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
         """Add received states, forces sent, and forces that were dropped."""
-        self._trace.longest = _KEPT_PERIODS * self.period
-        self._trace.feed(states, forces, dropped)
+        self._run.trace.longest = _KEPT_PERIODS * self.period
+        self._run.trace.feed(states, forces, dropped)
 
     def table(self, periods: int, end: float) -> str:
         """Return the samples of the last `periods` natural periods up to `end` (s) as CSV, SI."""
-        columns = self._trace.samples(periods * self.period, end)
+        columns = self._run.trace.samples(periods * self.period, end)
         text = StringIO()
         np.savetxt(text, np.transpose(columns), "%.9g", ",", header=",".join(_COLUMNS), comments="")
         return text.getvalue().replace("nan", "")
 
     def _marks(self, window: float) -> list[tuple[float, str]]:
         """Return the times (s before now) of events in the window, and their marks."""
-        newest = self._trace.newest
+        newest = self._run.trace.newest
         events = [event for event in list(self._run.events) if event.mark]
         # Of a slider that is moved in steps, the last.
         last = [
@@ -84,7 +86,7 @@ class Frames:
         contains the number of points of each line.
         """
         period, drive = self.period, self._run.drive
-        frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
+        frame = self._run.trace.frame(periods * period, 5.0 * period, buckets=400)
         axes = _axes(drive)
         length, speed, force = (axis.scale for axis in axes)
         cycles = {

@@ -72,6 +72,7 @@ class ListenerNode(PollingNode):
             qos_profile_parameter_events,
         )
         self._parameter_writers = 0
+        self._ended = False
         self.create_timer(0.02, self._take_samples, clock=clock)
         self.create_timer(0.1, self._watch, clock=clock)
 
@@ -94,6 +95,9 @@ class ListenerNode(PollingNode):
 
     def _take_samples(self) -> None:
         """Pass on the states and forces received."""
+        had_ended, self._ended = self._ended, self.ended
+        if had_ended and not self._ended:
+            self.run.begin_run()
         states, _ = joint_state_columns(list(waiting_messages(self._states)))
         forces, _ = wrench_columns(list(waiting_messages(self._forces)))
         dropped, _ = wrench_columns(list(waiting_messages(self._dropped_forces)))

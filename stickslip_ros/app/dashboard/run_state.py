@@ -21,6 +21,7 @@ from stickslip_ros.scenarios.parameters import (
     controller_node,
 )
 from stickslip_ros.scenarios.plant_parameters import PlantParameters
+from stickslip_ros.show.live_trace import LiveTrace
 from stickslip_ros.show.quantities import Units
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import number_in
@@ -86,21 +87,31 @@ class RunState:
         """Control law of the controller that was heard, the default law until one is heard."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
         """Current parameters by node and flat name, as far as they are known and allowed."""
+        self.events: deque[Event] = deque(maxlen=200)
+        """Events, the newest last."""
+        self.begin_run()
+        self._moved_at = 0.0
+        """Time of the newest samples on the monotonic clock, s."""
+        self._answering_since: float | None = None
+        """Stamp of the sample that the controller answered first, ns."""
+        self._known_drive: tuple[Mapping[str, Any], Drive | None] = ({}, None)
+
+    def begin_run(self) -> None:
+        """Forget the controllers, the motion and the cycles of the run before."""
+        self.health = {node: self.health[node] for node in ("analyzer", "plant")}
+        self.trace = LiveTrace(0.0)
+        """The last samples."""
         self.cycles: Mapping[Topic[Any], deque[float]] = {
             topic: deque(maxlen=CYCLES_KEPT) for topic in (AMPLITUDE, STICK_FRACTION, FREQUENCY)
         }
         """The measures of the last cycles by topic."""
         self.cycle_count = 0
         """Number of all cycles received."""
-        self.events: deque[Event] = deque(maxlen=200)
-        """Events, the newest last."""
         self.newest = 0
         """Stamp of the newest sample, ns; 0 before the first."""
-        self._moved_at = 0.0
-        """Time of the newest samples on the monotonic clock, s."""
-        self._answering_since: float | None = None
-        """Stamp of the sample that the controller answered first, ns."""
-        self._known_drive: tuple[Mapping[str, Any], Drive | None] = ({}, None)
+        # Stamps of another run may be those of samples to come.
+        events = [event._replace(mark="", stamp=0) for event in self.events]
+        self.events = deque(events, self.events.maxlen)
 
     @property
     def controller(self) -> str:
@@ -152,7 +163,7 @@ class RunState:
             return 0.0
         return max((plant.get("reply_timeout") or 0.0) - still, 0.0)
 
-    def time_of(self, stamp: int) -> float | None:
+    def time_of(self, stamp: float) -> float | None:
         """Return the simulated time since the plant was activated, s; None if it is not known."""
         first = number_in(self.health["plant"].figures.get(FIRST_STAMP, ""))
         return (stamp - first) / NANOSECONDS if 0 < first <= stamp else None

@@ -89,7 +89,7 @@ def test_it_hears_states_forces_and_cycles(
     graph: Graph, observer: ListenerNode, shown: Shown
 ) -> None:
     assert {health.state for health in observer.run.health.values()} == {ABSENT}
-    run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
+    plant = run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
     graph.wait_until(lambda: observer.run.cycle_count > 3, "cycles")
     assert (np.diff(shown.stamps) > 0).all()
     assert len(shown.stamps) > 300
@@ -99,6 +99,12 @@ def test_it_hears_states_forces_and_cycles(
     assert 0.0 <= observer.run.cycles[STICK_FRACTION][-1] <= 1.0
     assert 0.1 < observer.run.cycles[FREQUENCY][-1] < 0.2
     assert int(observer.run.health["plant"].figures["samples"]) > 0
+    for node in graph._nodes[2:]:  # not the observers
+        node.trigger_deactivate()
+        node.trigger_cleanup()
+    graph.wait_until(lambda: observer._ended, "the run has ended")
+    plant.trigger_configure()
+    graph.wait_until(lambda: not observer.run.cycle_count, "the next run has no cycles yet")
 
 
 def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
@@ -190,7 +196,7 @@ def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: Listene
 
 def test_reset_puts_the_motion_back(graph: Graph, observer: ListenerNode, shown: Shown) -> None:
     run_loop(graph, observer, expects_control=False, **{"initial.position": 0.5})
-    graph.wait_until(lambda: abs(shown.position[-1] - 0.5) > 0.05, "the slide has moved")
+    graph.wait_until(lambda: shown.states and abs(shown.position[-1] - 0.5) > 0.05, "it moves")
     before = len(shown.position)
     assert not outcome(graph, observer.requests.reset())
     graph.wait_until(lambda: 0.5 in shown.position[before:], "the initial position again")
