@@ -122,7 +122,9 @@ class SliderField:
                 named(self._undo.props("flat dense round size=sm"), f"undo {name}")
             self._slider = ui.element("input").classes("w-full slider")
             named(self._slider.props("type=range"), name)
-            self._slider.on("input", self._hold)
+            self._slider.on("input", partial(self._hold, True))
+            # A slider that is back where it was does not change.
+            self._slider.on("pointerup", partial(self._hold, False))
             self._slider.on("change", self._slide, js_handler="(e) => emit(e.target.value)")
             self._refusal = refusal_label()
 
@@ -146,8 +148,8 @@ class SliderField:
             self._slider.props.update(min=low, max=high, step=step, value=place)
             self._number.set_value(self._shown)
 
-    def _hold(self) -> None:
-        self._held = True
+    def _hold(self, held: bool) -> None:
+        self._held = held
 
     async def _slide(self, event: GenericEventArguments) -> None:
         self._held = False
@@ -243,10 +245,11 @@ class ParametersCard:
 
 @dataclass(frozen=True)
 class Setting:
-    """Parameters with a slider, whether control is on, and both and the measures as texts."""
+    """Parameters with a slider (in units), whether control is on; both and measures as texts."""
 
     values: dict[str, float]
     active: bool
+    units: Units
     texts: dict[str, str]
 
 
@@ -280,6 +283,8 @@ class Settings:
 
     def refresh(self) -> None:
         """Show the settings side by side with what is there now."""
+        for name, stored in self._stored.items():
+            self._use[name].set_enabled(stored.units == self._run.units)
         sides = {**self._stored, "now": self._now()}
         rows = [
             {"what": what} | {side: setting.texts.get(what, "") for side, setting in sides.items()}
@@ -303,11 +308,10 @@ class Settings:
             for name, value in values.items()
         }
         texts["control"] = "on" if self._run.control_on else "off"
-        return Setting(values, self._run.control_on, texts | self._measures())
+        return Setting(values, self._run.control_on, units, texts | self._measures())
 
     def _store(self, name: str) -> None:
         self._stored[name] = self._now()
-        self._use[name].set_enabled(True)
         self._table.set_visibility(True)
         call("keep", name)
         self.refresh()
