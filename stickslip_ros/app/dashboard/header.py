@@ -10,6 +10,7 @@ from stickslip_ros.app.dashboard.frames import PERIODS
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.run_state import ABSENT, SILENT
 from stickslip_ros.measures.cycle_measures import Regime
+from stickslip_ros.nodes.base.managed import NEWEST_STAMP
 from stickslip_ros.show import GREY
 from stickslip_ros.show.regimes import REGIMES
 from stickslip_ros.text import number_in
@@ -98,7 +99,9 @@ class Header:
             for name in ("late_forces", "missed_deadlines")
             if samples and figures.get(name)
         ]
-        since = f"t = {run.units.text(run.time_of(run.newest), 's')}"
+        # A page that does not keep up with a fast run may miss its last samples.
+        newest = max(run.newest, number_in(figures.get(NEWEST_STAMP, "")))
+        since = f"t = {run.units.text(run.time_of(newest), 's')}"
         recording = "recording to" if run.health["analyzer"].state == "active" else "bag"
         recorded = f"{recording} {bag}" if bag else "not recorded"
         self._facts.set_text(", ".join(filter(None, (since, *late, recorded, run.command))))
