@@ -209,7 +209,8 @@ class RunState:
         for node, health in self.health.items():
             silence = time.monotonic() - health.heard_at
             if health.heard_at and health.state != SILENT and silence > SILENCE:
-                self._update(node, Health(SILENT, 2, "", health.figures, health.heard_at))
+                error = health.message if health.level == 2 else ""  # why a run has ended, perhaps
+                self._update(node, Health(SILENT, 2, error, health.figures, health.heard_at))
 
     def take_parameters(self, node: str, values: Mapping[str, Any]) -> None:
         """Take parameters of a node, by flat name."""

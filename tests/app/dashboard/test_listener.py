@@ -89,7 +89,7 @@ def test_it_hears_states_forces_and_cycles(
     graph: Graph, observer: ListenerNode, shown: Shown
 ) -> None:
     assert {health.state for health in observer.run.health.values()} == {ABSENT}
-    plant = run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
+    run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
     graph.wait_until(lambda: observer.run.cycle_count > 3, "cycles")
     assert (np.diff(shown.stamps) > 0).all()
     assert len(shown.stamps) > 300
@@ -100,10 +100,9 @@ def test_it_hears_states_forces_and_cycles(
     assert 0.1 < observer.run.cycles[FREQUENCY][-1] < 0.2
     assert int(observer.run.health["plant"].figures["samples"]) > 0
     for node in graph._nodes[2:]:  # not the observers
-        node.trigger_deactivate()
-        node.trigger_cleanup()
+        node.trigger_shutdown()
     graph.wait_until(lambda: observer._ended, "the run has ended")
-    plant.trigger_configure()
+    graph.add(PlantNode)
     graph.wait_until(lambda: not observer.run.cycle_count, "the next run has no cycles yet")
 
 
@@ -265,6 +264,9 @@ def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
     graph.wait_until(lambda: observer.run.health["plant"].state == "active", "the plant again")
     events = [each.text for each in observer.run.events]
     assert events.index("plant silent") < events.index("plant is back, active")
+    observer.run.health = {"plant": Health("inactive", 2, "the motion diverges", heard_at=0.1)}
+    observer.run.mark_silent()
+    assert observer.run.health["plant"].message == "the motion diverges"
 
 
 CONTROLLER = "washout_controller"
