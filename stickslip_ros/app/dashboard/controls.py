@@ -109,7 +109,6 @@ class SliderField:
         self._earlier: list[float] = []
         self._shown = ""
         self._outdated = False
-        self._held = False
         name = name_of(full_name)
         with ui.element("div").classes("w-full"):
             with ui.row().classes("w-full items-center no-wrap gap-1"):
@@ -122,9 +121,6 @@ class SliderField:
                 named(self._undo.props("flat dense round size=sm"), f"undo {name}")
             self._slider = ui.element("input").classes("w-full slider")
             named(self._slider.props("type=range"), name)
-            self._slider.on("input", partial(self._hold, True))
-            # A slider that is back where it was does not change.
-            self._slider.on("pointerup", partial(self._hold, False))
             self._slider.on("change", self._slide, js_handler="(e) => emit(e.target.value)")
             self._refusal = refusal_label()
 
@@ -140,19 +136,17 @@ class SliderField:
         self._number.set_enabled(known)
         self._undo.set_enabled(known and bool(self._earlier))
         shown = f"{value / self._scale:.6g}" if known else ""
-        if known and not self._held and (self._outdated or shown != self._shown):
+        if known and (self._outdated or shown != self._shown):
             self._shown, self._outdated = shown, False
             ends = slider_range(value or usual, self._parameter)
             low, high, step, place = (f"{number / self._scale:.9g}" for number in (*ends, value))
-            # The value last: a range input keeps it within the limits that it has.
-            self._slider.props.update(min=low, max=high, step=step, value=place)
+            # The value last: a range input keeps it within the limits that it has. The dot: as a
+            # property that Vue sets when it changes, not whenever anything on the page does.
+            self._slider.props.update({"min": low, "max": high, "step": step, ".value": place})
             self._number.set_value(self._shown)
 
-    def _hold(self, held: bool) -> None:
-        self._held = held
-
     async def _slide(self, event: GenericEventArguments) -> None:
-        self._held = False
+        self._slider.props[".value"] = event.args
         await self._set(float(f"{float(event.args) * self._scale:.9g}"))
 
     async def _enter(self) -> None:
