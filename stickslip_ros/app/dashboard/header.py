@@ -24,6 +24,7 @@ class Header:
         self._run, self._listener, self._ended = listener.run, listener, ended
         self._regime_colour = ""
         self._description = "", "", ""
+        self._paused = False
         with ui.row().classes("w-full items-center"):
             heading(1, self._run.namespace).classes("text-2xl")
             self._regime = ui.label("").classes("regime")
@@ -114,13 +115,13 @@ class Header:
         """Tell page.js the command, the bag and the settings, by which it names downloads."""
         run, name = self._run, self._run.namespace
         description = run.command or name, self._bag or name, settings
-        # A run that ends switches control off, after the motion.
+        # A run that ends switches control off, after the motion; a paused view is of before.
         ends = self._description[0] and run.health["plant"].state != "active"
-        if description != self._description and not ends:
+        if description != self._description and not (ends or self._paused):
             self._description = description
             call("describe", *description)
 
     def _pause_view(self) -> None:
-        paused = self._view.text == "Pause view"
-        self._view.set_text("Continue view" if paused else "Pause view")
-        call("pause", paused)
+        self._paused = not self._paused
+        self._view.set_text("Continue view" if self._paused else "Pause view")
+        call("pause", self._paused)

@@ -4,7 +4,7 @@
 // composes whatever lies between two changes. This leaves more processor time for a simulation on
 // this machine.
 
-// Once paused, ECharts draws the lines itself, with cursor and zoom.
+// Once paused, ECharts draws the lines over time itself, with cursor and zoom.
 
 const INTERVAL = 1000 / 15;
 const FRAMES_OF_PORTRAIT = 3;
@@ -149,6 +149,17 @@ function overlaid() {
 const paint = (context, scale, { line, colour, dots, ...look }) =>
   dots ? drawDots(context, scale, line, colour) : drawLine(context, scale, line, colour, look);
 
+// Draws the lines over time; a motion that was kept may be longer than the window.
+function paintLines(context, chart, layers, width) {
+  const [left, right] = [-width, 0].map((time) => chart.convertToPixel({ gridIndex: 0 }, [time, 0])[0]);
+  context.save();
+  context.beginPath();
+  context.rect(left, 0, right - left, chart.getHeight());
+  context.clip();
+  layers.forEach((layer) => paint(context, scaleOf(chart, layer.grid), layer));
+  context.restore();
+}
+
 function drawMarks(context, chart, marks) {
   if (!marks.length) return;
   const ink = dark.matches ? "#d0d4da" : "#444b55";
@@ -156,11 +167,11 @@ function drawMarks(context, chart, marks) {
   context.strokeStyle = ink;
   context.setLineDash([1, 3]);
   context.font = "11px sans-serif";
-  const bottom = chart.convertToPixel({ gridIndex: 2 }, [0, limits.force?.[0] ?? 0])[1];
-  const top = 0.11 * chart.getHeight();
+  const [top, inside, bottom] = [0.11, 0.2, 0.91].map((share) => share * chart.getHeight());
   let free = -Infinity;
   for (const [time, text] of marks) {
     const [x] = chart.convertToPixel({ gridIndex: 0 }, [time, 0]);
+    if (!chart.containPixel({ gridIndex: 0 }, [x, inside])) continue; // beyond the zoom
     context.beginPath();
     context.moveTo(x, top);
     context.lineTo(x, bottom);
@@ -199,15 +210,13 @@ function drawMotion(motion) {
   });
   const trace = chartOf("trace");
   const context = canvasOn(trace);
-  layers.forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
+  if (!page.paused) paintLines(context, trace, layers, width);
   drawMarks(context, trace, motion.marks);
-  if (page.frames % FRAMES_OF_PORTRAIT === 0) drawPortrait(motion, positions, speeds);
+  if (page.paused || page.frames % FRAMES_OF_PORTRAIT === 0) drawPortrait(motion, positions, speeds);
 }
 
-function drawPortrait({ lines, labels, equilibrium, belt_speed }, positions, speeds) {
-  const { BLUE, GREEN, SKY_BLUE } = page.colours;
+function drawPortrait({ labels, equilibrium, belt_speed }, positions, speeds) {
   const [displacement, speed] = labels;
-  const { orbit } = lines;
   setChanged("portrait", {
     xAxis: { name: displacement, ...positions },
     yAxis: { name: speed, ...speeds },
@@ -216,6 +225,12 @@ function drawPortrait({ lines, labels, equilibrium, belt_speed }, positions, spe
       { markLine: { data: [{ yAxis: belt_speed }] } },
     ],
   });
+  paintPortrait();
+}
+
+function paintPortrait() {
+  const { BLUE, GREEN, SKY_BLUE } = page.colours;
+  const { orbit } = page.motion.lines;
   const portrait = chartOf("portrait");
   const plane = canvasOn(portrait);
   const scale = scaleOf(portrait, 0);
@@ -242,6 +257,8 @@ function drawLoop({ lines }) {
   const data = Array.from(x, (value, i) => [value / page.frictionScale, y[i]]);
   chart.setOption({ series: [{}, { data }] });
 }
+
+const paintMarks = () => drawMarks(canvasOn(chartOf("trace")), chartOf("trace"), page.motion.marks);
 
 // Returns the text of a cursor along an axis: values with their units, in the order of the panels.
 const reading = (along, labels) => (items) => {
@@ -273,6 +290,10 @@ function show(paused) {
     data: points(line),
   }));
   const options = window.getElement(page.trace).options;
+  for (const chart of ["trace", "portrait"].map(chartOf)) {
+    chart.dispatchAction({ type: "updateAxisPointer", currTrigger: "leave" });
+    chart.dispatchAction({ type: "hideTip" }); // it would look for series that are no more
+  }
   chartOf("trace").setOption(
     {
       tooltip: { ...cursor, formatter: reading(time_label, labels) },
@@ -286,13 +307,20 @@ function show(paused) {
     tooltip: { ...cursor, formatter: reading(labels[0], labels.slice(1)) },
     series: [{}, { data: paused && page.motion ? points(page.motion.lines.orbit) : [] }],
   });
-  ["trace", "portrait"].forEach((name) => canvasOn(chartOf(name)));
+  // What is painted above the charts follows their zoom and size.
+  for (const [name, paintAbove] of Object.entries({ trace: paintMarks, portrait: paintPortrait })) {
+    chartOf(name).off("finished", paintAbove);
+    if (paused && page.motion) chartOf(name).on("finished", paintAbove);
+  }
+  if (paused && page.motion) drawMotion(page.motion);
 }
 
-function drawCycles({ count, amplitude, stick_fraction, label }) {
+function drawCycles(cycles) {
+  const { count, amplitude, stick_fraction, label } = cycles;
+  page.measured = cycles;
   const now = performance.now();
   const news = count !== cyclesDrawn.count || label !== cyclesDrawn.label;
-  if (!news || now - cyclesDrawn.at < CYCLES_INTERVAL) return;
+  if (!news || (now - cyclesDrawn.at < CYCLES_INTERVAL && !page.final)) return;
   cyclesDrawn = { count, label, at: now };
   const numbered = (values) => values.map((value, index) => [count - values.length + index + 1, value]);
   chartOf("cycles").setOption({
@@ -363,6 +391,7 @@ function redraw() {
   cyclesDrawn = { at: -Infinity };
   loopDrawn = -Infinity;
   if (page.paused) show(true);
+  if (page.paused && page.measured) drawCycles(page.measured);
 }
 
 function save(url, name) {
@@ -382,18 +411,25 @@ const shownRows = () => `/shown.csv?periods=${page.periods}&end=${page.motion?.e
 // Fetches the samples of a paused view, since the server forgets old ones and ends.
 const keepRows = () => (page.rows ??= blobOf(shownRows()));
 
-page.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
+page.fit = () => {
+  Object.keys(limits).forEach((name) => delete limits[name]);
+  if (page.paused) show(true);
+};
 page.show = (periods) => {
   page.periods = periods;
   page.fit();
 };
 page.keep = (name) => {
   if (page.motion) kept[name] = page.motion;
+  if (page.paused) show(true);
 };
 page.pause = (paused) => {
   page.paused = paused;
   if (paused) keepRows();
-  else page.rows = null;
+  else {
+    page.rows?.then(URL.revokeObjectURL);
+    page.rows = null;
+  }
   show(paused);
 };
 page.describe = (run, bag, settings) => {
@@ -434,14 +470,28 @@ page.png = () => {
   save(picture.toDataURL("image/png"), fileName(".png"));
 };
 
+// Draws the newest frame, on a hidden page, too.
+const drawLast = () =>
+  new Promise((resolve) => {
+    if (page.paused || socket.readyState !== WebSocket.OPEN || !drawable()) {
+      resolve();
+      return;
+    }
+    socket.addEventListener("message", resolve, { once: true });
+    socket.send(String(page.periods));
+  });
+
 // Fetches what the page offers, before the server ends.
 page.end = async () => {
   page.final = true;
   document.body.classList.add("ended");
+  await drawLast();
+  page.paused = true; // the view that stays has a cursor
   const link = document.querySelector('a[href="/bag.mcap"]');
   const bag = link && (await blobOf("/bag.mcap"));
   if (bag) link.href = bag;
   await keepRows();
+  show(true);
   return true;
 };
 page.copy = ({ currentTarget }) => navigator.clipboard.writeText(currentTarget.previousElementSibling.textContent);
@@ -450,6 +500,7 @@ page.scaleFriction = (scale) => {
 };
 page.showKept = (overlay) => {
   page.overlay = overlay;
+  if (page.paused) show(true);
 };
 page.frames = 0;
 const start = () => {

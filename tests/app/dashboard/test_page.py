@@ -133,8 +133,19 @@ FRICTION = """() => {
 """Relative speed of the operating point on the friction curve, in its unit."""
 
 
+LOOK = """() => {
+    const { darkMode, legend, yAxis } = window.getElement(stickslip.trace).chart.getOption();
+    const above = document.querySelector(".tall .lines");
+    const { data } = above.getContext("2d").getImageData(0, 0, above.width, above.height);
+    return { darkMode, legend: legend[0].data, label: yAxis[0].name, marks: data.some(Boolean) };
+}"""
+"""How the time plots look; of a paused view only marks lie above the chart."""
+
 CHANGED = re.compile(r"t = .* s: \w+\.\w+: .* to ")
 """An event that says that a parameter has changed."""
+
+SWITCHED_OFF = re.compile("t = .* s: washout_controller inactive")
+"""An event of a run that moves: a controller that waits to be active is inactive, too."""
 
 SLOW = (
     *("run", "feed_drive", "--dashboard", "--bag", "bag"),
@@ -155,7 +166,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed_until_the_motion_diverges(
     expect(page.get_by_role("row", name="plant active")).to_be_visible()
 
     control.click()
-    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
+    expect(events(page).get_by_text(SWITCHED_OFF)).to_be_visible()
     page.get_by_role("button", name="Reset").click()
     expect(page.get_by_text("stick-slip", exact=True)).to_be_visible()
     expect(page.get_by_text(re.compile(r"^43\d(\.\d+)? µm$"))).to_be_visible()
@@ -197,14 +208,8 @@ def test_a_limit_cycle_is_seen_stopped_and_changed_until_the_motion_diverges(
     expect(events(page).get_by_text(CHANGED)).to_have_text([only])
     expect(page.get_by_role("button", name="10 periods")).to_have_attribute("aria-pressed", "true")
 
-    # All that is shown stays as it is when the system changes to dark.
     new_speed = pytest.approx(-35.0)  # mm/s
     wait_for(lambda: page.evaluate(FRICTION) == new_speed, "the new belt speed is in the curve")
-    page.emulate_media(color_scheme="dark")
-    wait_for(lambda: last_amplitude(page) < math.inf, "the cycles are drawn again")
-    assert page.evaluate(FRICTION) == new_speed
-    page.emulate_media(color_scheme="light")
-
     page.get_by_role("button", name="undo belt speed").click()
     expect(events(page).get_by_text("plant.belt_speed: 35 mm/s to 40 mm/s")).to_be_visible()
     expect(speed).to_have_value("40")  # mm/s, as in the plots
@@ -240,7 +245,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed_until_the_motion_diverges(
     # A click that arrives in parts switches the controller nevertheless.
     page.evaluate(DELAYED)
     control.click()
-    expect(events(page).get_by_text("washout_controller inactive")).to_have_count(2)
+    expect(events(page).get_by_text(SWITCHED_OFF)).to_have_count(2)
     expect(control).not_to_be_checked()
 
     gain = page.get_by_label("cubic gain, value")
@@ -249,8 +254,10 @@ def test_a_limit_cycle_is_seen_stopped_and_changed_until_the_motion_diverges(
     expect(events(page).get_by_text("washout_controller.cubic_gain: 0")).to_be_visible()
     page.get_by_role("button", name="Reset").click()
     wait_for(lambda: swing(page) > 800.0, "the limit cycle is drawn")  # µm
+    page.evaluate("Object.defineProperty(document, 'hidden', { get: () => true })")
     control.click()
     expect(page.get_by_role("heading", name="Run ended: the motion diverges")).to_be_visible()
+    wait_for(lambda: swing(page) > 1e4, "the end is drawn, on a hidden page, too")  # µm
     expect(page.get_by_text("regime:")).to_have_count(0)
     served.process.wait(PATIENCE)
     assert "Traceback" not in "".join(served.said)
@@ -271,10 +278,6 @@ CROSSED = """() => {
 """Whether the gains lie below the limit in the map, where they suppress a vibration."""
 
 
-LEGEND_HAS_A = """() => window.getElement(stickslip.trace).chart.getOption().legend[0].data
-    .includes("A")"""
-
-
 def accessibility(page: Page) -> list[str]:
     """Return what axe finds against WCAG 2.2 AA and good practice."""
     rules = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"]
@@ -293,37 +296,44 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     control = page.get_by_role("switch", name="washout controller")
     expect(control).to_be_checked()
     control.click()
-    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
+    expect(events(page).get_by_text(SWITCHED_OFF)).to_be_visible()
     wait_for(
         lambda: page.evaluate(CROSSED) is True, "at this belt speed the gains suppress a vibration"
     )
 
     # The belt speed is lowered by its slider until the slide vibrates.
     slider = page.get_by_role("slider", name="belt speed")
-    slider.focus()
-    wait_for(lambda: _pressed(slider) <= 40.0, "the slider is moved")  # mm/s
+    width, facts = slider.bounding_box()["width"], page.get_by_text(re.compile("^t ="))
+    slider.hover(position={"x": 8.0 + (width - 16.0) * 40.0 / 125.0, "y": 8.0})  # of 125 mm/s
+    page.mouse.down()
+    expect(facts).not_to_have_text(facts.inner_text())  # it stays while the page changes
+    page.mouse.up()
+    expect(events(page).get_by_text("plant.belt_speed: 50 mm/s to 40 mm/s")).to_be_visible()
     page.get_by_role("button", name="Reset").click()
     expect(page.get_by_text("stick-slip", exact=True).first).to_be_visible()
     wait_for(lambda: page.evaluate(CROSSED) is False, "the gains come to lie on the unstable side")
-    assert "plant.belt_speed" in events(page).inner_text()
     wait_for(lambda: swing(page) > 500.0, "the vibration is drawn")
     page.get_by_role("button", name="Store A").click()
-    page.wait_for_function(LEGEND_HAS_A)
+    wait_for(lambda: "A" in page.evaluate(LOOK)["legend"], "A is drawn")
 
     gain = page.get_by_label("linear gain, value")
     gain.fill("-3")  # kN s/m
     gain.press("Enter")
     wait_for(lambda: page.evaluate(CROSSED) is True, "more gain is on the stable side")
-    control.click()
-    expect(page.get_by_text("steady sliding", exact=True).first).to_be_visible()
-    page.get_by_role("button", name="Store B").click()
-
-    # Before and after are in the window of 200 periods, and in its samples.
     page.get_by_text("200 periods").click()
     page.wait_for_function("stickslip.motion.window > 12")  # s: a period takes 63 ms
-    wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
+    control.click()
+    expect(page.get_by_text("steady sliding", exact=True).first).to_be_visible()
+
+    # Before and after are in the window of 200 periods, and in its samples.
     page.get_by_role("button", name="Pause view").click()
+    page.get_by_role("button", name="Store B").click()
+    assert swing(page) > 500.0
     page.get_by_text("10 periods", exact=True).click()  # for when the view continues
+    gain.fill("-2")  # is not of what is shown
+    gain.press("Enter")
+    expect(events(page).get_by_text("linear_gain: -3 kN s/m to -2 kN s/m")).to_be_visible()
+    assert page.evaluate(LOOK)["marks"]
     row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
     expect(row).to_contain_text("stick-slip")
     expect(row).to_contain_text("steady sliding")
@@ -362,15 +372,13 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
     written = next((tmp_path / "bag").glob("*.mcap"))
     assert bag.value.path().read_bytes() == written.read_bytes()
     assert accessibility(page) == []
+    # All that is shown stays as it is when the system changes to dark.
+    page.emulate_media(color_scheme="dark")
+    wait_for(lambda: page.evaluate(LOOK)["darkMode"], "the chart is dark")
+    assert page.evaluate(LOOK)["label"] == "displacement (µm)"
+    assert page.evaluate(FRICTION) == pytest.approx(-40.0)  # mm/s
+    assert last_amplitude(page) < math.inf
     assert "Traceback" not in "".join(served.said)
-
-
-def _pressed(slider: Locator) -> float:
-    """Press the key that lowers a slider; return the value that it had."""
-    value = float(slider.input_value())
-    if value > 40.0:
-        slider.press("ArrowLeft")
-    return value
 
 
 def test_a_page_that_comes_and_goes_changes_nothing(
@@ -419,12 +427,15 @@ def test_a_page_of_no_run_and_of_a_node_that_dies_and_returns(
     expect(page.get_by_text("plant active")).to_be_visible()
     expect(page.get_by_role("switch", name="washout controller")).to_be_disabled()
     expect(events(page).get_by_text("no control force arrives").first).to_be_visible()
+    page.get_by_role("button", name="Store A").click()
     plant.kill()
     expect(page.get_by_text("plant silent").first).to_be_visible()
-    processes.node("plant", **drive, expects_control=False)
+    expect(page.get_by_role("button", name="Use A")).to_be_enabled()
+    processes.node("plant", **drive, expects_control=False, mass=2.0)
     expect(page.get_by_text(re.compile("plant is back"))).to_be_visible()
     before = page.evaluate("stickslip.motion.end")
     page.wait_for_function("before => stickslip.motion.end !== before", arg=before)
+    expect(page.get_by_role("button", name="Use A")).to_be_disabled()  # it has no units
     assert served.end() == 130
     assert "Traceback" not in "".join(served.said)
 
