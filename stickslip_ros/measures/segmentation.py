@@ -59,8 +59,9 @@ _NO_FEED = 0.02
 _BETWEEN = 0.7
 """Error of an amplitude by an extreme between two samples of a slip, in amplitudes over the square
 of their number."""
-_EXTREME_ERROR = 0.15
-"""Error of an amplitude by the noise or the step of the sensor, in the larger of them."""
+_EXTREME_ERROR, _NOISE_ERROR = 0.15, 0.75
+"""Error of an amplitude by the step of the sensor, and by its noise: an extreme of many samples is
+the extreme of their noise, too."""
 _MAIN_SHARE = 0.35
 """Travel of a slip, in large ones, from which a cycle may begin with it."""
 _LONG_GAP = 3.0
@@ -184,7 +185,7 @@ def _measured(
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
-    extremes, rounded = _extremes(time, position, release, width, max(step, noise))
+    extremes, rounded = _extremes(time, position, release, width, max(step / 2.0, noise))
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     still = [(before.landing, after.release) for before, after in pairwise(used)]
@@ -198,7 +199,9 @@ def _measured(
             frequency=1.0 / period,
             stick_fraction=1.0 - float(np.sum(durations)) / float(release[-1] - release[0]),
         ),
-        errors=_errors(means, used, width, hypot(_EXTREME_ERROR * max(step, noise), rounded)),
+        errors=_errors(
+            means, used, width, hypot(_EXTREME_ERROR * step, _NOISE_ERROR * noise, rounded)
+        ),
         sticks=True,
         amplitudes=means.amplitudes,
         end=float(release[-1]),
@@ -257,7 +260,7 @@ def _extremes(
     Of parabolas through the samples around each (Savitzky and Golay, Analytical Chemistry 36,
     1964): displacements are extreme at a vertex, within shares of the `width` of a slip, in rows.
     A parabola rounds a corner, the more the longer it reaches: while half of its reach changes the
-    mean amplitude by more than half of the `resolution`, m, the reach is halved. Also returns the
+    mean amplitude by more than the `resolution`, m, the reach is halved. Also returns the
     last change, m, which is an error.
     """
     rows: list[int] = np.searchsorted(time, release).tolist()
@@ -271,7 +274,7 @@ def _extremes(
         narrow //= 2
         highest, lowest = _displacements(part, cycles, narrow)
         change = float(np.mean(highest - lowest - (high - low))) / 2.0
-        if change <= resolution / 2.0:
+        if change <= resolution:
             rounded = max(change, 0.0)
             break
         high, low, rounded = highest, lowest, change

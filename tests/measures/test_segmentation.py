@@ -186,6 +186,16 @@ def test_a_vibration_on_a_larger_motion_is_no_cycle() -> None:
     assert (measures.regime, measures.amplitude, measures.period) == (None, None, None)
 
 
+def test_the_error_of_an_amplitude_has_the_extremes_of_the_noise() -> None:
+    time = 1e-9 * STAMPS[::10]
+    noise = 0.05 * TRAVEL * np.random.default_rng(1).standard_normal(len(time))
+    exact, noisy = (stick_slip(time, stairs(time) + by, 0.0, 20, 0.0) for by in (0.0, noise))
+    assert exact is not None
+    assert noisy is not None
+    apart = noisy.cycle.amplitude - exact.cycle.amplitude
+    assert 0.1 * exact.cycle.amplitude < apart < 2.0 * noisy.errors.amplitude
+
+
 def test_a_motion_that_repeats_nothing_has_no_regime_and_a_reason(tmp_path: Path) -> None:
     time = 0.01 * np.arange(800)
     velocity = np.array([0.0, 1.0, 0.1, 0.6, 0.0, 0.9, 0.2, 0.5])[np.arange(800) // 100]
