@@ -69,7 +69,8 @@ _STAND = 2.0
 """Length of a stand of a slide on a guide at rest, in stands between its moves, from which it is
 stuck."""
 _RIPPLE = 4.0
-"""Range of the middles of cycles beside a line, in amplitudes, above which they are ripples."""
+"""Range of the middles of cycles, and beside their line that of all middles, in amplitudes, above
+which they are ripples."""
 _OTHER_SPEED = 0.1
 """Share of the belt speed by which that of a stick differs at most."""
 _SLIP_SHARE = 0.1
@@ -258,12 +259,13 @@ def _by_reversals(
         return rest(samples[(first + len(samples)) // 2 :], window, reading), None
     starts = [low.time for low in part.lows]
     fit = None if quick else _fit(window, reading, part.samples, starts)
+    # Half of the cycles: a single one may seem to stick for a moment.
+    means = fit or CycleMeans.over(part.cycles, 0.5)
+    if _are_ripples(part.samples, means):
+        return without_cycles(None, None), None
     if fit is not None:
         return _found(window, part.samples, fit, fit.noise), fit
-    if _are_ripples(part.cycles):
-        return without_cycles(None, None), None
-    # Half of the cycles: a single one may seem to stick for a moment.
-    measures = _found(window, part.samples, CycleMeans.over(part.cycles, 0.5), window.noise)
+    measures = _found(window, part.samples, means, window.noise)
     fastest = max(cycle.velocity_amplitude for cycle in part.cycles)
     if (
         measures.errors
@@ -286,13 +288,20 @@ def _may_move_on(position: FloatArray, least: float) -> bool:
     return len(changes) > 1 and len(position) - changes[-1] <= _STAND * np.diff(changes).max()
 
 
-def _are_ripples(cycles: Sequence[Cycle]) -> bool:
-    """Return whether cycles are ripples, as of 50 Hz, on a larger motion to and fro."""
-    if len(cycles) < LEAST_CYCLES:
+def _are_ripples(samples: NoisySamples, means: CycleMeans) -> bool:
+    """Return whether the last cycles are ripples, as of 50 Hz, on a larger motion to and fro.
+
+    Their middles leave their level, and those before them the line through these.
+    """
+    count, amplitude = len(means.amplitudes), means.cycle.amplitude
+    since = float(samples.time[-1]) - count * means.cycle.period
+    rows = (len(samples) - samples.row(since)) // max(count, 1)
+    if count < LEAST_CYCLES or rows == 0:
         return False
-    order, middle = np.arange(len(cycles)), np.array([cycle.midpoint for cycle in cycles])
-    beside = middle - np.polyval(np.polyfit(order, middle, 1), order)
-    return float(np.ptp(beside)) > _RIPPLE * float(np.mean([cycle.amplitude for cycle in cycles]))
+    middle = samples.position[len(samples) % rows :].reshape(-1, rows).mean(axis=1)
+    last = middle[-count:]
+    line = (last[-1] - last[0]) / (count - 1) * np.arange(len(middle))
+    return min(float(np.ptp(last)), float(np.ptp(middle - line))) > _RIPPLE * amplitude
 
 
 def _by_line(
@@ -309,6 +318,8 @@ def _by_line(
     if fit is None:
         few = frequency * FEW_SAMPLES > 1.0
         return without_cycles(None, Regime.UNDERSAMPLED if few else None), None
+    if _are_ripples(window.samples, fit):
+        return without_cycles(None, None), None
     return _found(window, samples, fit, fit.noise), fit
 
 

@@ -177,11 +177,12 @@ def test_an_uneven_belt_or_an_earlier_stick_slip_is_no_other_guide() -> None:
     assert fed(columns(STAMPS, slips, belt_velocity=feed), UNKNOWN).other_guide is None
 
 
-def test_a_vibration_on_a_larger_motion_is_no_cycle() -> None:
+@pytest.mark.parametrize(("frequency", "shift"), [(35.3, 0.0), (50.3, 0.45)])
+def test_a_vibration_on_a_larger_motion_is_no_cycle(frequency: float, shift: float) -> None:
     time = 1e-9 * STAMPS
     noise = 2e-6 * np.random.default_rng(1).standard_normal(len(time))
-    ripple = 0.1 * TRAVEL * np.sin(2.0 * np.pi * 35.3 * time)
-    lag = TRAVEL / PERIOD * time - stairs(time) + ripple + noise
+    ripple = 0.1 * TRAVEL * np.sin(2.0 * np.pi * frequency * time)
+    lag = TRAVEL / PERIOD * time - stairs(time + shift) + ripple + noise
     measures = fed(columns(STAMPS, lag, belt_velocity=TRAVEL / PERIOD), UNKNOWN).measures()
     assert (measures.regime, measures.amplitude, measures.period) == (None, None, None)
 
