@@ -104,7 +104,7 @@ def last_feed(samples: SampleColumns) -> int:
     time = (samples.stamp[rows] - samples.stamp[rows[0]]) / NANOSECONDS
     position = samples.position[rows]
     last = stick_slip(time, position, 0.0, _LAST_CYCLES, 0.0)
-    if last is None or not last.feed:
+    if last is None or not last.rests or not last.feed:
         return 0
     time = time[time <= last.end]
     position = position[: len(time)]
@@ -135,6 +135,8 @@ def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     time_known = time[samples.is_valid]
     slips = stick_slip(time_known, known.position, 0.0, _MOST_CYCLES, 0.0)
     feed = mean_feed(time_known, known.position)
+    if slips is not None and not slips.rests:
+        slips = None  # the slips of a ripple, say, have another feed
     if slips is not None and abs((feed or 0.0) - slips.feed) > _SAME_FEED * abs(slips.feed):
         feed = slips.feed
     if not feed:

@@ -7,6 +7,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.measures.feed import last_feed, mean_feed, relative_to_feed
 from stickslip_ros.measures.segmentation import stick_slip
 from stickslip_ros.samples import SampleColumns
+from tests.measures.records import columns, milliseconds
 
 TIME = 1e-3 * np.arange(8000, dtype=np.float64)
 STAMP = (1e6 * np.arange(8000)).astype(np.int64)
@@ -76,3 +77,11 @@ def test_a_release_just_before_the_first_position_begins_no_cycle() -> None:
     found = stick_slip(TIME, stairs(TIME + 0.335), 0.0, 20, 0.0)
     assert found is not None
     assert found.cycle.period == pytest.approx(PERIOD, rel=1e-4)
+
+
+def test_a_ripple_tells_no_other_feed() -> None:
+    time = 1e-3 * np.arange(8150)
+    wave = 4e-3 * (time + np.sin(5.0 * np.pi * time) / (5.0 * np.pi))
+    ripple = 2.2e-5 * np.sin(2.0 * np.pi * 77.7 * time)
+    samples = columns(milliseconds(8150), wave + ripple, belt_velocity=0.0)
+    assert last_feed(samples) == 0
