@@ -155,13 +155,17 @@ class SampleMeter:
     def feed(self, samples: SampleColumns) -> list[Cycle]:
         """Add the samples that follow; return the cycles completed by them.
 
-        Samples that are not valid, see `SampleColumns.is_valid`, count as lost.
+        Samples that are not valid, see `SampleColumns.is_valid`, count as lost. Those with stamp
+        and position of the one before are left out.
         """
-        samples = samples[samples.is_valid]
-        self.samples += len(samples)
+        samples, known = samples[samples.is_valid], 0
         if self._last is not None:
-            samples = self._last.followed_by(samples)
-        if len(samples) == 0:
+            samples, known = self._last.followed_by(samples), 1
+        again = (np.diff(samples.stamp) == 0) & (np.diff(samples.position) == 0.0)
+        if again.any():
+            samples = samples[np.append(True, ~again)]
+        self.samples += len(samples) - known
+        if len(samples) == known:
             return []
         self.first = min(self.first, float(samples.stamp[0]))
         cycles: list[Cycle] = []

@@ -54,6 +54,8 @@ def test_measures_of_a_limit_cycle() -> None:
     meter = SampleMeter(window=20)
     cycles = meter.feed(limit_cycle())
     measures = meter.measures()
+    twice = fed(limit_cycle()[np.arange(14_002) // 2])  # of each sample
+    assert (twice.measures(), twice.samples) == (measures, meter.samples)
     (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
     assert len(cycles) == measures.cycles == 9  # of 7.07 s in 70 s
     assert measures.regime is Regime.STICK_SLIP
@@ -274,7 +276,7 @@ def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
 
 def test_many_segments_in_one_block_take_time_in_proportion() -> None:
     """Each looks only a little ahead: seen from every one to the end it would be 4e8 steps."""
-    meter = fed(still(np.full(20_000, SECOND)))
+    meter = fed(still(SECOND - np.arange(20_000)))
     assert meter.samples == 20_000
     assert meter.lost_samples == 0
     assert meter.duration == 0.0
