@@ -1,17 +1,15 @@
 """The controller node of any law, and references, on the real middleware."""
 
-from dataclasses import dataclass
 from functools import partial
 from math import nan
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
-from stickslip_ros.model.constants import constant
-from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.model.control import Pid
 from stickslip_ros.model.control.base import State
 from stickslip_ros.model.signals import ramp
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -26,37 +24,15 @@ from stickslip_ros.record.codec import (
 from stickslip_ros.record.reader import Recording
 from stickslip_ros.record.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.samples import Reference, Sample
-from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, ControllerParameters
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from tests.nodes.graph import PATIENCE, Graph
-from tests.scenarios.foreign_laws import make_known
 
 SECOND = 1_000_000_000
 
 
-@dataclass(frozen=True)
-class Servo(ControlLaw):
-    """A spring to the reference, and a damper."""
-
-    name: ClassVar[str] = "servo"
-    follows_reference: ClassVar[bool] = True
-    stiffness: float = constant(10.0, "Stiffness.", "N/m")
-    damping: float = constant(1.0, "Damping.", "N s/m")
-
-    def respond(
-        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
-    ) -> tuple[float, tuple[float, ...]]:
-        """Return the force."""
-        ahead = (reference.velocity or 0.0) - sample.velocity
-        return self.stiffness * (
-            (reference.position or 0.0) - sample.position
-        ) + self.damping * ahead, state
-
-
-@pytest.fixture
-def servo(monkeypatch: pytest.MonkeyPatch) -> partial[ControllerNode]:
-    """The node of a law that follows a reference."""
-    make_known(monkeypatch, Servo, ControllerParameters(control_law=Servo()))
-    return partial(ControllerNode, Servo.name)
+servo = partial(ControllerNode, "pid")
+SPRING = {"position_gain": 10.0, "velocity_gain": 1.0, "integral_gain": 0.0}
+"""A spring to the reference, and a damper."""
 
 
 class Loop:
@@ -130,10 +106,8 @@ def test_a_state_at_which_the_force_is_held_is_not_answered(graph: Graph) -> Non
     assert len(loop.forces) == 3
 
 
-def test_a_reference_from_a_topic_holds_until_the_next(
-    graph: Graph, servo: partial[ControllerNode]
-) -> None:
-    loop = Loop(graph, servo, **{"reference.kind": "topic"})
+def test_a_reference_from_a_topic_holds_until_the_next(graph: Graph) -> None:
+    loop = Loop(graph, servo, **SPRING, **{"reference.kind": "topic"})
     graph.wait_until(lambda: loop.given.get_subscription_count() == 2, "it listens")
     assert loop.force(SECOND, position=0.1) == -1.0
     for number, (given, force) in enumerate(
@@ -153,21 +127,21 @@ def test_a_reference_from_a_topic_holds_until_the_next(
 
 
 def test_it_survives_a_law_that_fails_and_says_so(
-    graph: Graph, servo: partial[ControllerNode], monkeypatch: pytest.MonkeyPatch
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    respond = Servo.respond
+    respond = Pid.respond
 
-    def failing(law: Servo, state: State, elapsed: float, sample: Sample, given: Reference) -> Any:
+    def failing(law: Pid, state: State, elapsed: float, sample: Sample, given: Reference) -> Any:
         if sample.position == 1.0:
             raise KeyError("table")
         return (
             (nan, state) if sample.position == 2.0 else respond(law, state, elapsed, sample, given)
         )
 
-    monkeypatch.setattr(Servo, "respond", failing)
-    loop = Loop(graph, servo, force_limit=5.0)
+    monkeypatch.setattr(Pid, "respond", failing)
+    loop = Loop(graph, servo, **SPRING, force_limit=5.0)
     assert loop.force(SECOND, 0.1) == -1.0
-    dropped = "a joint state stamped {0}000000000 ns: the control law servo fails at {1} s: {2}"
+    dropped = "a joint state stamped {0}000000000 ns: the control law pid fails at {1} s: {2}"
     for position, reason in ((1, "KeyError: 'table'"), (2, "its force is nan, which must be")):
         stamp = (2 + position) * SECOND
         loop.states.publish(pack_joint_state(stamp, (position, 0.0), (0.0, 0.0), (0.0, 0.0)))
@@ -176,11 +150,10 @@ def test_it_survives_a_law_that_fails_and_says_so(
     assert loop.force(5 * SECOND, 0.1) == -1.0
 
 
-def test_a_course_of_its_own_is_published_with_each_answer(
-    graph: Graph, servo: partial[ControllerNode]
-) -> None:
+def test_a_course_of_its_own_is_published_with_each_answer(graph: Graph) -> None:
     course = {"kind": "ramp", "amplitude": 0.4, "duration": 4.0, "start": 1.0}
-    loop = Loop(graph, servo, **{f"reference.{name}": value for name, value in course.items()})
+    given = {f"reference.{name}": value for name, value in course.items()}
+    loop = Loop(graph, servo, **SPRING, **given)
     forces = [loop.force((1 + n) * SECOND) for n in range(3)]
     assert forces == pytest.approx([0.0, 0.1, 1.1])
     graph.wait_until(lambda: len(loop.references) == 3, "references are heard")
