@@ -1,8 +1,5 @@
 """Drift: runs that look steady from cycle to cycle and would not be later."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,11 +10,11 @@ from stickslip_ros.measures.cycle_measures import Cycle, Trend, trend_text
 from stickslip_ros.measures.drift import Drift, TrendMeter
 from stickslip_ros.measures.run_meter import RunMeter
 from stickslip_ros.measures.run_report import report_of
-from stickslip_ros.model.control import ControlLaw
+from stickslip_ros.model.control import Pid
 from stickslip_ros.motion import RecordedMotion
 from stickslip_ros.motion.controller import Controller
 from stickslip_ros.motion.simulation import simulate_sampled
-from stickslip_ros.samples import ForceColumns, Reference, Sample, SampleColumns
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.simulate import sensor_meter
 from tests.measures.records import columns, milliseconds
@@ -26,20 +23,8 @@ COUNT = 4000
 TIME = np.arange(COUNT) * 1e-3
 
 
-@dataclass(frozen=True)
-class WindsUp(ControlLaw):
-    """Velocity feedback whose integral of the position never ends."""
-
-    name: ClassVar[str] = "winds_up"
-
-    def initial_state(self, sample: Sample, reference: Reference) -> tuple[float, ...]:
-        return (0.0,)
-
-    def respond(
-        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
-    ) -> tuple[float, tuple[float, ...]]:
-        total = state[0] + elapsed * sample.position
-        return -3000.0 * sample.velocity - 4e5 * total, (total,)
+# An integral of the position that never ends.
+WINDS_UP = Pid(position_gain=0.0, integral_gain=4e5, velocity_gain=3000.0)
 
 
 def wound_up(duration: float, *overrides: str) -> tuple[Measures, Measures | None]:
@@ -47,7 +32,7 @@ def wound_up(duration: float, *overrides: str) -> tuple[Measures, Measures | Non
     scenario = load_scenario("feed_drive", list(overrides))
     motion = RecordedMotion(scenario.plant.as_drive(), 0.0, 0.0)
     loop, told = scenario.plant.as_loop(motion), sensor_meter(scenario)
-    controller = Controller(WindsUp())
+    controller = Controller(WINDS_UP)
     meter = scenario.cycle_meter(20)
     true = simulate_sampled(loop, motion, controller, duration, meter, measured=told)
     return true, None if told is None else told.measures()
