@@ -23,12 +23,8 @@ def test_a_keyword_is_the_text_that_it_stands_for() -> None:
     by_text = load_scenario(
         "paper",
         [
-            "plant.belt_speed=0.2",
-            "plant.friction.law=linear",
-            "plant.initial.position=0.1",
-            "analyzer.window=5",
-            "washout_controller.linear_gain=-2",
-            "plant.publish_truth=true",
+            *("plant.belt_speed=0.2", "plant.friction.law=linear", "plant.initial.position=0.1"),
+            *("analyzer.window=5", "washout_controller.linear_gain=-2", "plant.publish_truth=true"),
         ],
     )
     keywords = {

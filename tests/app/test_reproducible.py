@@ -15,27 +15,17 @@ AFTER_STAMP = slice(12, None)
 """Of a serialized message: what follows encapsulation, seconds and nanoseconds."""
 
 PAPER = [
-    "paper",
-    "--pace=lockstep",
-    "--duration=5",
-    "-p=plant.belt_speed=0.3",
-    "-p=plant.disturbance.kind=sine",
-    "-p=plant.disturbance.amplitude=0.05",
-    "-p=plant.disturbance.frequency=0.7",
-    "-p=plant.disturbance.start=1.0",
-    "-p=plant.disturbance.duration=3.0",
-    "-p=plant.force_delay=0.0037",
+    *("paper", "--pace=lockstep", "--duration=5", "-p=plant.belt_speed=0.3"),
+    *("-p=plant.disturbance.kind=sine", "-p=plant.disturbance.amplitude=0.05"),
+    *("-p=plant.disturbance.frequency=0.7", "-p=plant.disturbance.start=1.0"),
+    *("-p=plant.disturbance.duration=3.0", "-p=plant.force_delay=0.0037"),
     "-p=plant.force_jitter=0.021",
 ]
 SLOW = [
-    "paper",
-    "--composed",
-    "--duration=2",
+    *("paper", "--composed", "--duration=2"),
     "-p=plant.rate=15",  # a force that takes a twentieth of a second is in time
-    "-p=plant.disturbance.kind=step",
-    "-p=plant.disturbance.amplitude=0.1",
-    "-p=plant.disturbance.start=0.5",
-    "-p=plant.force_delay=0.03",
+    *("-p=plant.disturbance.kind=step", "-p=plant.disturbance.amplitude=0.1"),
+    *("-p=plant.disturbance.start=0.5", "-p=plant.force_delay=0.03"),
 ]
 
 

@@ -14,20 +14,8 @@ pytestmark = pytest.mark.process
 ROOT = Path(__file__).parents[2]
 
 HEAVY = {
-    "heyoka",
-    "importlib.metadata",
-    "matplotlib",
-    "mcap",
-    "numpy",
-    "numpy.ma",
-    "numpy.random",
-    "pandas",
-    "pint",
-    "rclpy",
-    "rich",
-    "scipy",
-    "xarray",
-    "yaml",
+    *("heyoka", "importlib.metadata", "matplotlib", "mcap", "numpy", "numpy.ma", "numpy.random"),
+    *("pandas", "pint", "rclpy", "rich", "scipy", "xarray", "yaml"),
 }
 """Modules that take long to import, each more than a tenth of what Python itself takes."""
 READING = {"mcap", "numpy", "yaml"}

@@ -28,12 +28,7 @@ OURS = (
 # Variables that make, pytest and the fixtures of a test set.
 _CALLERS = (
     *this_machine_only(),
-    "MAKEFLAGS",
-    "MAKELEVEL",
-    "MFLAGS",
-    "PYTEST_ADDOPTS",
-    "VENV",
-    "VIRTUAL_ENV",
+    *("MAKEFLAGS", "MAKELEVEL", "MFLAGS", "PYTEST_ADDOPTS", "VENV", "VIRTUAL_ENV"),
 )
 
 _STAMPS = (".ready", ".complete")

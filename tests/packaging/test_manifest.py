@@ -30,19 +30,11 @@ KEYS = {name: set[str]() for name in KEYLESS.split()} | {
     "pyyaml": {"python3-yaml"},
     "rich": {"python3-rich"},
     "ros-jazzy-common-interfaces": {
-        "diagnostic_msgs",
-        "geometry_msgs",
-        "sensor_msgs",
-        "std_msgs",
-        "std_srvs",
+        *("diagnostic_msgs", "geometry_msgs", "sensor_msgs", "std_msgs", "std_srvs")
     },
     "ros-jazzy-rclpy": {
-        "ament_index_python",
-        "builtin_interfaces",
-        "lifecycle_msgs",
-        "rcl_interfaces",
-        "rclpy",
-        "rosgraph_msgs",
+        *("ament_index_python", "builtin_interfaces", "lifecycle_msgs", "rcl_interfaces"),
+        *("rclpy", "rosgraph_msgs"),
     },
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},

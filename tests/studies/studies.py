@@ -12,13 +12,9 @@ SHORT = SettlingOptions(transient=5.0, cycles=2)
 """Long enough to tell one motion from another."""
 
 EXPONENTIAL = (
-    "plant.expects_control=false",
-    "plant.friction.law=exponential",
-    "plant.friction.static=1.0",
-    "plant.friction.kinetic=0.5",
-    "plant.friction.decay_speed=0.5",
-    "plant.friction.viscous=0.0",
-    "plant.damping=0.1",
+    *("plant.expects_control=false", "plant.damping=0.1", "plant.friction.law=exponential"),
+    *("plant.friction.static=1.0", "plant.friction.kinetic=0.5"),
+    *("plant.friction.decay_speed=0.5", "plant.friction.viscous=0.0"),
 )
 """A law under which rest and limit cycle coexist, from the Hopf point on."""
 
