@@ -15,6 +15,7 @@ from stickslip_ros.measures.cycle_measures import (
     Cycle,
     Measures,
     Regime,
+    Trend,
     with_drift,
     without_cycles,
 )
@@ -291,8 +292,10 @@ class SampleMeter:
                 f"the amplitude is only {measures.amplitude / self.step:.2g} steps of the encoder: "
                 "the standard errors are not known"
             )
-        errors = measures.errors or {}
-        if errors.get("amplitude", 0.0) > _BETWEEN_SAMPLES * (measures.amplitude or 0.0):
+        errors, most = measures.errors or {}, _BETWEEN_SAMPLES * (measures.amplitude or 0.0)
+        changes = measures.trend in (Trend.GROWING, Trend.DECAYING)
+        sticks = measures.regime is Regime.STICK_SLIP
+        if sticks and not changes and errors.get("amplitude", 0.0) > most:
             yield (
                 "the slips last for about one sample: the amplitude has a large error, and "
                 "positions that are held between updates look the same"

@@ -291,7 +291,7 @@ def _may_move_on(position: FloatArray, least: float) -> bool:
 def _are_ripples(samples: NoisySamples, means: CycleMeans) -> bool:
     """Return whether the last cycles are ripples, as of 50 Hz, on a larger motion to and fro.
 
-    Their middles leave their level, and those before them the line through these.
+    Their middles vary, and those of all samples differ from the line through these.
     """
     count, amplitude = len(means.amplitudes), means.cycle.amplitude
     since = float(samples.time[-1]) - count * means.cycle.period
