@@ -15,7 +15,6 @@ from stickslip_ros.measures.cycle_measures import (
     Cycle,
     Measures,
     Regime,
-    Trend,
     with_drift,
     without_cycles,
 )
@@ -47,8 +46,8 @@ _EDGE_ERROR = 0.03
 interpolated, and the rounding is alike in all cycles."""
 
 _MOST_HIDDEN, _BETWEEN_SAMPLES = 0.05, 0.3
-"""Standard error of a stick fraction of 0 above which a note tells what may be hidden; that of an
-amplitude, in amplitudes, of slips between two samples."""
+"""Standard error of a stick fraction of 0 above which a note tells what may be hidden; those
+of amplitude and midpoint, in amplitudes, of slips between two samples."""
 
 _FEW_STRAYS, _STRAY_SHARE = 10, 0.01
 """Number and share of samples off the grid of the plant up to which it may have been restarted."""
@@ -293,9 +292,9 @@ class SampleMeter:
                 "the standard errors are not known"
             )
         errors, most = measures.errors or {}, _BETWEEN_SAMPLES * (measures.amplitude or 0.0)
-        changes = measures.trend in (Trend.GROWING, Trend.DECAYING)
-        sticks = measures.regime is Regime.STICK_SLIP
-        if sticks and not changes and errors.get("amplitude", 0.0) > most:
+        # Of cycles that grow or decay the amplitude has a large error, the midpoint has not.
+        unsure = min(errors.get(name, 0.0) for name in ("amplitude", "midpoint")) > most
+        if unsure and measures.regime is Regime.STICK_SLIP:
             yield (
                 "the slips last for about one sample: the amplitude has a large error, and "
                 "positions that are held between updates look the same"
