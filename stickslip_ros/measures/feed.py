@@ -135,10 +135,9 @@ def relative_to_feed(samples: SampleColumns) -> tuple[SampleColumns, float]:
     time_known = time[samples.is_valid]
     slips = stick_slip(time_known, known.position, 0.0, _MOST_CYCLES, 0.0)
     feed = mean_feed(time_known, known.position)
-    if slips is not None and not slips.rests:
-        slips = None  # the slips of a ripple, say, have another feed
-    if slips is not None and abs((feed or 0.0) - slips.feed) > _SAME_FEED * abs(slips.feed):
-        feed = slips.feed
+    if slips is not None and slips.rests:  # the slips of a ripple, say, have another feed
+        apart = abs((feed or 0.0) - slips.feed)
+        feed = slips.feed if apart > _SAME_FEED * abs(slips.feed) else feed
     if not feed:
         return samples, 0.0
     moved = replace(

@@ -175,17 +175,20 @@ def _measured(
     if len(starts) <= LEAST_CYCLES or not np.all(np.diff(release) > 0.0):  # times that repeat
         return None
     del used[-1]
-    period = float(release[-1] - release[0]) / (len(release) - 1)
+    lasting = float(release[-1] - release[0])
+    period = lasting / (len(release) - 1)
     durations = np.add.reduceat([slip.duration for slip in used], np.array(starts[:-1]) - starts[0])
     shares = 1.0 - durations / np.diff(release)
+    stick_fraction = 1.0 - float(np.sum(durations)) / lasting
     travel = np.array([slip.travel for slip in used])
     onward = abs(float(np.sum(travel))) >= _NO_FEED * float(np.sum(np.abs(travel)))
-    feed = float(np.sum(travel)) / float(release[-1] - release[0]) if onward else 0.0
+    feed = float(np.sum(travel)) / lasting if onward else 0.0
     if not belt_velocity:
         position = position - feed * (time - time[0])
     width = float(np.median([slip.duration for slip in used]))
     width = max(width * (len(time) - 1) / float(time[-1] - time[0]), 1.0)
     extremes, rounded = _extremes(time, position, release, width, max(step / 2.0, noise))
+    extreme_error = hypot(_EXTREME_ERROR * step, _NOISE_ERROR * noise, rounded)
     columns = [*extremes, np.diff(release), 1.0 / np.diff(release), shares]
     means = CycleMeans.over([Cycle(*measures) for measures in np.transpose(columns).tolist()])
     still = [(before.landing, after.release) for before, after in pairwise(used)]
@@ -194,14 +197,8 @@ def _measured(
     if creep_error > REST_SHARE * unit:
         return None
     return StickSlip(
-        cycle=replace(
-            means.cycle,
-            frequency=1.0 / period,
-            stick_fraction=1.0 - float(np.sum(durations)) / float(release[-1] - release[0]),
-        ),
-        errors=_errors(
-            means, used, width, hypot(_EXTREME_ERROR * step, _NOISE_ERROR * noise, rounded)
-        ),
+        cycle=replace(means.cycle, frequency=1.0 / period, stick_fraction=stick_fraction),
+        errors=_errors(means, used, width, extreme_error),
         sticks=True,
         amplitudes=means.amplitudes,
         end=float(release[-1]),

@@ -96,12 +96,12 @@ class MachineMotion:
             return self._completed(samples), forces
 
     def whole(self, samples: SampleColumns) -> SampleColumns:
-        """Return the updated ones of all samples, with velocities that agree with the positions."""
+        """Return those of all samples that update the position, with velocities that agree."""
         if self._recorded is None or not self._recorded[0]:
             return samples
         every, own = updated(samples.stamp, [samples.position])
         if every > 1:
-            why = f"lie between updates of the position, one in {every:.3g},"
+            why = f"lie between updates of the position, which come every {every:.3g} messages,"
             self._left_out[why] += int(np.count_nonzero(~own))
             samples = samples[own]
         elif self.estimated:
